@@ -1,0 +1,47 @@
+"""Errors of the package: each names the field, the value, what is allowed and the next step."""
+
+from collections.abc import Collection
+from typing import Any
+
+
+class ExcavError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class ConfigurationError(ExcavError, ValueError):
+    """A setting, an argument or an input has a value that cannot be used."""
+
+
+class DatasetError(ExcavError, ValueError):
+    """A dataset on disk lacks something that the operation needs."""
+
+
+class DeviceError(ExcavError, RuntimeError):
+    """A device (joystick, simulated robot) is missing, lost or used out of turn."""
+
+
+class RenderingError(ExcavError, RuntimeError):
+    """Pictures cannot be made on this machine."""
+
+
+def require_choice(field: str, value: Any, allowed: Collection[Any], *, hint: str = "") -> None:
+    """Raise unless a value is one of the allowed ones.
+
+    Args:
+        field: Name of the setting as its user writes it.
+        value: The value given.
+        allowed: Every value that would do.
+        hint: Next step, added to the message.
+
+    Raises:
+        ConfigurationError: `value` is not in `allowed`.
+    """
+    if value not in allowed:
+        names = ", ".join(repr(a) for a in allowed)
+        raise ConfigurationError(f"{field}={value!r} is not known; allowed: {names}. {hint}".rstrip())
+
+
+def require(condition: bool, message: str) -> None:  # noqa: FBT001 - reads as an assertion
+    """Raise `ConfigurationError(message)` unless the condition holds."""
+    if not condition:
+        raise ConfigurationError(message)
