@@ -1,0 +1,14 @@
+"""Environments. Importing this package registers their gymnasium ids and nothing else."""
+
+import gymnasium as gym
+
+GYM_IDS = {"Scoop-v0": "lerobot_excav.envs.excavator.env:ExcavatorEnv"}
+"""Tasks by name, and the class that plays each."""
+
+for _task, _entry_point in GYM_IDS.items():
+    gym.register(
+        id=f"lerobot_excav/{_task}",
+        entry_point=_entry_point,
+        kwargs={"task": _task},
+        max_episode_steps=200,
+    )

@@ -1,0 +1,1 @@
+"""The excavator: machine, scenes, targets, task and scripted operator."""

@@ -1,0 +1,299 @@
+"""The excavator as a gymnasium environment."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from lerobot_excav.envs.excavator.cycle import DigCycle
+from lerobot_excav.envs.excavator.mask_condition import MASK_CONDITIONS, conditioned_mask
+from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.excavator.scene import SCENE_SETS, Scene, draw_scene
+from lerobot_excav.envs.excavator.targets import TARGET_COUNT, Target, target_mask_img
+from lerobot_excav.envs.excavator.worksite import TICK_S, Worksite
+from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.errors import ConfigurationError, require, require_choice
+
+TASKS = ("Scoop-v0",)
+OBS_TYPES = ("pixels_agent_pos", "agent_pos")
+TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
+TICKS_PER_SECOND = round(1.0 / TICK_S)
+LEAST_IMAGE_SIZE = 32
+
+# Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
+FULL_BUCKET_KG = 485.0
+
+
+class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
+    """An 8-t excavator in front of a pile, with a box to its left.
+
+    Task (`Scoop-v0`): one dig-load-dump cycle on the region that the target mask shows.
+
+    Scene and randomisation: pile shape and mass, colours, light, initial joint angles and the four targets come from
+    `scene_set` and `scene_id`. `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`;
+    `reset(options={"scene_id": …, "target_id": …})` selects directly. A reset with neither draws a scene.
+
+    Observation:
+
+    | key | shape, type | meaning |
+    |---|---|---|
+    | `pixels/main` | (H, W, 3) uint8 | fixed, raised view of the dig area |
+    | `pixels/cab` | (H, W, 3) uint8 | view along the boom, turns with the house |
+    | `pixels/target_mask` | (H, W, 3) uint8, {0, 255} | commanded dig region in `main` at the start of the cycle |
+    | `agent_pos[0:4]` | float32 | joint positions swing, boom, arm, bucket [rad] |
+    | `agent_pos[4:8]` | float32 | joint velocities in the same order [rad/s] |
+
+    Action: float32 (4,) in [-1, 1], rate commands for swing, boom, arm, bucket; values beyond are clipped.
+
+    Reward: gain of soil in the box divided by 485 kg, plus 1 on success.
+
+    Success: at loading onset the cutting edge was inside the patch, at least 100 kg lie in the box, the bucket has been
+    empty for 0.5 s and nothing of the machine hit the box hard. `info["is_success"]` is true only then.
+
+    Termination: the cycle is complete (bucket emptied into the box). Truncation: the time limit `episode_length`.
+
+    Args:
+        task: One of `TASKS`.
+        obs_type: `pixels_agent_pos`, or `agent_pos` to leave the pictures out (several times faster).
+        observation_height: Image height H [px].
+        observation_width: Image width W [px].
+        scene_set: `train`, `val` or `test`.
+        mask_condition: Which mask is shown, see `mask_condition.py`.
+        fps: Frames per second; divides 50.
+        episode_length: Time limit in frames.
+        soil: Name of the soil preset.
+        render_mode: `rgb_array` or None.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - gymnasium's contract
+
+    def __init__(
+        self,
+        *,
+        task: str = "Scoop-v0",
+        obs_type: str = "pixels_agent_pos",
+        observation_height: int = 96,
+        observation_width: int = 128,
+        scene_set: str = "train",
+        mask_condition: str = "correct",
+        fps: int = 10,
+        episode_length: int = 200,
+        soil: str = "sand",
+        render_mode: str | None = "rgb_array",
+    ) -> None:
+        require_choice("task", task, TASKS)
+        require_choice("obs_type", obs_type, OBS_TYPES)
+        require_choice("scene_set", scene_set, SCENE_SETS)
+        require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
+        require_choice("soil", soil, tuple(PRESETS))
+        require_choice("render_mode", render_mode, ("rgb_array", None))
+        require_frame_rate(fps)
+        require_image_size(observation_height, observation_width)
+        require(episode_length >= 1, f"episode_length={episode_length} must be at least 1 frame")
+        self.task, self.task_description = task, TASK_DESCRIPTION
+        self.scene_set, self.mask_condition, self.soil_name = scene_set, mask_condition, soil
+        self.fps, self.episode_length = fps, episode_length
+        self.obs_type, self.render_mode = obs_type, render_mode
+        self.metadata = {**type(self).metadata, "render_fps": fps}
+        self.observation_size = (observation_height, observation_width)
+        self.observation_space = _observation_space(self.observation_size, obs_type)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (4,), np.float32)
+        self._ticks_per_frame = TICKS_PER_SECOND // fps
+        self._worksite: Worksite | None = None
+        self._renderer: WorksiteRenderer | None = None
+        self._cycle: DigCycle | None = None
+        self._frame = 0
+
+    @property
+    def worksite(self) -> Worksite:
+        """Machine, soil and box; built at first use, so that vector workers build their own."""
+        if self._worksite is None:
+            self._worksite = Worksite(soil=self.soil_name)
+        return self._worksite
+
+    @property
+    def cycle(self) -> DigCycle:
+        """The running cycle.
+
+        Raises:
+            ConfigurationError: The environment has not been reset.
+        """
+        if self._cycle is None:
+            raise ConfigurationError("the environment has no episode yet; call reset() first")
+        return self._cycle
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the running episode."""
+        return self.cycle.scene
+
+    @property
+    def target_id(self) -> int:
+        """Index of the commanded target in `scene.targets`."""
+        return self.cycle.target_id
+
+    @property
+    def target(self) -> Target:
+        """The commanded dig region."""
+        return self.cycle.target
+
+    @property
+    def renderer(self) -> WorksiteRenderer:
+        """Camera pictures of the worksite; the graphics context is made at first use."""
+        if self._renderer is None:
+            height, width = self.observation_size
+            self._renderer = WorksiteRenderer(self.worksite.machine, height=height, width=width)
+        return self._renderer
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start an episode; see the class for how seed and options select scene and target.
+
+        Args:
+            seed: Also seeds the corruption of the mask.
+            options: May hold `scene_id` and `target_id`; other keys are left to those who set them.
+
+        Returns:
+            Observation and info.
+
+        Raises:
+            ConfigurationError: `scene_id` or `target_id` is out of range.
+        """
+        super().reset(seed=seed)
+        scene_id, target_id = self._select(seed, options or {})
+        scene = draw_scene(self.scene_set, scene_id, soil=self.soil_name)
+        self.worksite.reset(scene)
+        self._cycle = DigCycle(self.worksite, scene, target_id)
+        self._frame = 0
+        if self.obs_type == "pixels_agent_pos":
+            self._mask_img = self._draw_mask(scene, target_id)
+        return self._observe(), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Advance by one frame (1/fps s); see the class for action, reward and termination.
+
+        Raises:
+            ConfigurationError: The action has another shape than (4,) or is not finite.
+        """
+        command = require_action(action)
+        cycle = self.cycle
+        deposited_before_kg = cycle.state.deposited_mass_kg
+        for _ in range(self._ticks_per_frame):
+            self.worksite.tick(command)
+            cycle.update()
+        self._frame += 1
+        reward = (cycle.state.deposited_mass_kg - deposited_before_kg) / FULL_BUCKET_KG + float(cycle.is_success)
+        terminated = cycle.is_complete
+        # The wrapper of gym.make says the same; this keeps an environment built by hand finite, too.
+        truncated = self._frame >= self.episode_length and not terminated
+        info = self._info()
+        if terminated or truncated:
+            info["episode_metrics"] = self._episode_metrics()
+        return self._observe(), float(reward), terminated, truncated, info
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """Return the main view (H, W, 3) uint8, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return self.renderer.render("main", self.worksite.soil)
+
+    def depth_m(self) -> np.ndarray:
+        """Return the depth image registered with `main` [m along the optical axis], shape (H, W), float32."""
+        return self.renderer.depth("main", self.worksite.soil)
+
+    def close(self) -> None:
+        """Free the graphics context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _select(self, seed: int | None, options: dict[str, Any]) -> tuple[int, int]:
+        """Choose scene and target from options, else seed, else by chance."""
+        number = int(self.np_random.integers(2**31)) if seed is None else seed
+        scene_id = int(options.get("scene_id", number))
+        target_id = int(options.get("target_id", number % TARGET_COUNT))
+        require_choice("target_id", target_id, range(TARGET_COUNT))
+        return scene_id, target_id
+
+    def _draw_mask(self, scene: Scene, target_id: int) -> np.ndarray:
+        points_w = self.renderer.terrain_points_w(self.worksite.soil)
+        masks = [target_mask_img(target, points_w) for target in scene.targets]
+        return conditioned_mask(masks, target_id, self.mask_condition, self.np_random)
+
+    def _observe(self) -> dict[str, Any]:
+        machine = self.worksite.machine
+        observation: dict[str, Any] = {
+            "agent_pos": np.concatenate([machine.joint_pos, machine.joint_vel]).astype(np.float32)
+        }
+        if self.obs_type == "pixels_agent_pos":
+            soil = self.worksite.soil
+            observation["pixels"] = {
+                "main": self.renderer.render("main", soil),
+                "cab": self.renderer.render("cab", soil),
+                "target_mask": self._mask_img.copy(),
+            }
+        return observation
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "is_success": self.cycle.is_success,
+            "task_state": self.cycle.state.as_array(),
+            "scene_id": self.scene.scene_id,
+            "target_id": self.target_id,
+        }
+
+    def _episode_metrics(self) -> dict[str, Any]:
+        return {
+            "scene_set": self.scene_set,
+            "scene_id": self.scene.scene_id,
+            "target_id": self.target_id,
+            "mask_condition": self.mask_condition,
+            "soil": self.soil_name,
+            "is_success": self.cycle.is_success,
+            "frames": self._frame,
+            **self.cycle.metrics(),
+        }
+
+
+def require_action(action: np.ndarray) -> np.ndarray:
+    """Check a joystick command and clip it to [-1, 1].
+
+    Args:
+        action: Swing, boom, arm, bucket, shape (4,).
+
+    Returns:
+        The command as float64, shape (4,).
+
+    Raises:
+        ConfigurationError: Wrong shape, NaN or infinity.
+    """
+    command = np.asarray(action, dtype=np.float64)
+    require(command.shape == (4,), f"action has shape {command.shape}; it must be (4,): swing, boom, arm, bucket")
+    require(
+        bool(np.isfinite(command).all()), f"action={command.tolist()} is not finite; check the policy's statistics"
+    )
+    return np.clip(command, -1.0, 1.0)
+
+
+def require_frame_rate(fps: int) -> None:
+    """Raise `ConfigurationError` unless a frame lasts a whole number of ticks."""
+    divisors = [f for f in range(1, TICKS_PER_SECOND + 1) if TICKS_PER_SECOND % f == 0]
+    require_choice("fps", fps, divisors, hint=f"A frame must last a whole number of {TICK_S} s ticks.")
+
+
+def require_image_size(height: int, width: int) -> None:
+    """Raise `ConfigurationError` unless pictures are large enough to show a target."""
+    for field, size in (("observation_height", height), ("observation_width", width)):
+        require(
+            LEAST_IMAGE_SIZE <= size <= 1024,
+            f"{field}={size} px is out of range; allowed: {LEAST_IMAGE_SIZE} to 1024 (the default is 96 x 128)",
+        )
+
+
+def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:
+    spaces: dict[str, gym.Space[Any]] = {"agent_pos": gym.spaces.Box(-np.inf, np.inf, (8,), np.float32)}
+    if obs_type == "pixels_agent_pos":
+        image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
+        spaces["pixels"] = gym.spaces.Dict({key: image for key in ("main", "cab", "target_mask")})
+    return gym.spaces.Dict(spaces)

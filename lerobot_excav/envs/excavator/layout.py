@@ -1,0 +1,37 @@
+"""Where things stand on the worksite: machine, dig area and target box (world frame, see docs/conventions.md)."""
+
+import numpy as np
+
+from lerobot_excav.envs.soil import Container
+
+# Decided here (kind: design): the pile is centred 4.6 m in front of the swing axis, so that all of it lies between the
+# machine's least radius (about 1.6 m at ground) and its reach at ground (6.9 m).
+MACHINE_POS_W = np.array([-4.6, 0.0, 0.0])
+"""Point on the floor below the swing axis [m], shape (3,), world frame."""
+
+DIG_AREA_EXTENT_M = (6.0, 6.0)
+"""Size of the soil grid along x and y [m], centred on the world origin."""
+
+# 80 degrees to the left at the radius of the pile: a swing of usual length for loading a truck (kind: design).
+TARGET_BOX = Container(center_w=(-3.75, 4.75, 0.0), half_extent_m=(1.1, 1.1), wall_height_m=1.0, yaw_rad=0.0)
+"""The box that receives the soil."""
+
+
+def cylinder_from_world(point_w: np.ndarray) -> tuple[float, float, float]:
+    """Express a world point in the machine's cylinder coordinates.
+
+    Args:
+        point_w: Point [m], shape (3,), world frame.
+
+    Returns:
+        Radius from the swing axis [m], swing angle towards the point [rad], height [m].
+    """
+    dx, dy = point_w[0] - MACHINE_POS_W[0], point_w[1] - MACHINE_POS_W[1]
+    return float(np.hypot(dx, dy)), float(np.arctan2(dy, dx)), float(point_w[2])
+
+
+def world_from_cylinder(radius_m: np.ndarray, swing_rad: np.ndarray) -> np.ndarray:
+    """Return the ground-plane points (..., 2) [m] at given radii and swing angles of the machine."""
+    radius, swing = np.broadcast_arrays(radius_m, swing_rad)
+    offset = np.stack([radius * np.cos(swing), radius * np.sin(swing)], axis=-1)
+    return offset + MACHINE_POS_W[:2]

@@ -1,0 +1,53 @@
+"""Mask conditions: the right mask, and the corruptions that test whether a policy obeys it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lerobot_excav.errors import ExcavError
+
+MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
+
+_SHIFT_TRIES = 1000
+
+
+def conditioned_mask(
+    masks: Sequence[np.ndarray], target_id: int, condition: str, rng: np.random.Generator
+) -> np.ndarray:
+    """Return the mask that is shown under a condition.
+
+    Args:
+        masks: The right mask of every target, each (H, W, 3) of {0, 255}, uint8.
+        target_id: Index of the commanded target.
+        condition: `correct`; `zero` (empty); `random` (the same blob moved elsewhere in the picture, off its place);
+            `mismatched` (the mask of another target).
+        rng: Source of the place or of the other target.
+
+    Returns:
+        Mask (H, W, 3) of {0, 255}, uint8.
+    """
+    if condition == "zero":
+        return np.zeros_like(masks[target_id])
+    if condition == "random":
+        return _moved_elsewhere(masks[target_id], rng)
+    if condition == "mismatched":
+        others = [i for i in range(len(masks)) if i != target_id]
+        return masks[int(rng.choice(others))].copy()
+    return masks[target_id].copy()
+
+
+def _moved_elsewhere(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Shift a blob inside the picture so that it does not overlap its old place."""
+    rows, cols = np.nonzero(mask[..., 0])
+    height, width = mask.shape[:2]
+    for _ in range(_SHIFT_TRIES):
+        row_shift = int(rng.integers(-rows.min(), height - rows.max()))
+        col_shift = int(rng.integers(-cols.min(), width - cols.max()))
+        moved = np.zeros_like(mask)
+        moved[rows + row_shift, cols + col_shift] = 255
+        if not np.any(moved & mask):
+            return moved
+    raise ExcavError(
+        f"mask_condition='random': no free place for a blob of {rows.size} pixels in {height} x {width}; "
+        "use larger observation_height and observation_width"
+    )

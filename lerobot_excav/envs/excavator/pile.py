@@ -1,0 +1,73 @@
+"""Random piles of soil, shaped like what a truck or a loader leaves behind: overlapping heaps at rest."""
+
+import numpy as np
+
+from lerobot_excav.envs.soil import relax
+
+# Where heaps are placed [m], world frame (kind: design). Wider across the machine than along its boom, so that four
+# dig regions find room side by side and one behind the other.
+HEAP_X_RANGE_M = (-0.55, 0.55)
+HEAP_Y_RANGE_M = (-1.35, 1.35)
+PILE_MASS_RANGE_KG = (4800.0, 6000.0)
+
+
+def draw_pile(
+    rng: np.random.Generator,
+    *,
+    x_w: np.ndarray,
+    y_w: np.ndarray,
+    repose_tan: float,
+    density_kg_m3: float,
+) -> np.ndarray:
+    """Draw one pile at rest on the floor.
+
+    Args:
+        rng: Source of the shape and the mass.
+        x_w: Cell centres along x [m], shape (nx,).
+        y_w: Cell centres along y [m], shape (ny,), same spacing.
+        repose_tan: Steepest slope at which the soil rests.
+        density_kg_m3: Bulk density [kg/m3].
+
+    Returns:
+        Heights above the floor [m], shape (nx, ny).
+    """
+    cell_size_m = float(x_w[1] - x_w[0])
+    volume_m3 = rng.uniform(*PILE_MASS_RANGE_KG) / density_kg_m3
+    shape = _heaps(rng, x_w, y_w, repose_tan) + _ripples(rng, x_w, y_w)
+    heights = _fill_to_volume(shape, volume_m3 / cell_size_m**2)
+    return relax(heights, cell_size_m, repose_tan)
+
+
+def _heaps(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray, repose_tan: float) -> np.ndarray:
+    """Upper envelope of two to four cones a little flatter than repose, shape (nx, ny) [m]."""
+    count = int(rng.integers(2, 5))
+    # Spread across the pile rather than drawn one by one, so that no scene is a single narrow cone.
+    y_heap = np.linspace(*HEAP_Y_RANGE_M, count) + rng.uniform(-0.3, 0.3, count)
+    x_heap = rng.uniform(*HEAP_X_RANGE_M, count)
+    peak = rng.uniform(0.75, 1.1, count)
+    slope = repose_tan * rng.uniform(0.7, 0.95, count)
+    distance = np.hypot(x_w[:, None, None] - x_heap, y_w[None, :, None] - y_heap)
+    return np.max(peak - slope * distance, axis=2)
+
+
+def _ripples(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray) -> np.ndarray:
+    """Low waves of a few centimetres, shape (nx, ny) [m]."""
+    waves = np.zeros((x_w.size, y_w.size))
+    for _ in range(6):
+        heading, phase = rng.uniform(0.0, 2.0 * np.pi, 2)
+        wave_number = 2.0 * np.pi / rng.uniform(0.5, 1.6)
+        along = np.cos(heading) * x_w[:, None] + np.sin(heading) * y_w[None, :]
+        waves += rng.uniform(0.004, 0.014) * np.cos(wave_number * along + phase)
+    return waves
+
+
+def _fill_to_volume(shape: np.ndarray, column_sum_m: float) -> np.ndarray:
+    """Raise or lower the shape until what stands above the floor has the wanted volume (bisection on the level)."""
+    low, high = -float(shape.max()), column_sum_m
+    for _ in range(80):
+        level = 0.5 * (low + high)
+        if np.maximum(shape + level, 0.0).sum() < column_sum_m:
+            low = level
+        else:
+            high = level
+    return np.maximum(shape + high, 0.0)

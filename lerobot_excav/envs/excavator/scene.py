@@ -1,0 +1,110 @@
+"""Scenes: everything that is drawn before the first action, from a scene set and a number."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lerobot_excav.envs.excavator.appearance import Appearance, draw_appearance
+from lerobot_excav.envs.excavator.kinematics import inverse
+from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M
+from lerobot_excav.envs.excavator.pile import draw_pile
+from lerobot_excav.envs.excavator.targets import Target, TooFewTargetsError, find_targets
+from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.errors import ExcavError, require, require_choice
+
+SCENE_SETS = ("train", "val", "test")
+SOIL_CELL_SIZE_M = 0.05
+
+# Names this family of random streams; changing it changes every scene, so it changes with the scene's definition only.
+_STREAM = 0xE8CA7
+_PILE_TRIES = 50
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One starting situation of the worksite.
+
+    Attributes:
+        scene_set: `train`, `val` or `test`; their random streams are disjoint.
+        scene_id: Number within the set.
+        soil: Name of the soil preset.
+        heights_m: Soil above the floor [m], shape (nx, ny).
+        joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+        appearance: Colours and light.
+        targets: The feasible dig regions, indexed by `target_id`.
+    """
+
+    scene_set: str
+    scene_id: int
+    soil: str
+    heights_m: np.ndarray
+    joint_pos: np.ndarray
+    appearance: Appearance
+    targets: tuple[Target, ...]
+
+
+def cell_centres_w() -> tuple[np.ndarray, np.ndarray]:
+    """Return the soil's cell centres along x and y [m], shapes (nx,) and (ny,), world frame."""
+    counts = [round(extent / SOIL_CELL_SIZE_M) for extent in DIG_AREA_EXTENT_M]
+    x_w, y_w = ((np.arange(n) + 0.5) * SOIL_CELL_SIZE_M - 0.5 * n * SOIL_CELL_SIZE_M for n in counts)
+    return x_w, y_w
+
+
+def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
+    """Draw a scene; the same arguments give the same scene, byte for byte.
+
+    Args:
+        scene_set: One of `SCENE_SETS`. No scene of one set can occur in another.
+        scene_id: Any integer from 0.
+        soil: Name of the soil preset, which sets slope and density of the pile.
+
+    Returns:
+        The scene.
+
+    Raises:
+        ConfigurationError: An argument is not one of the allowed values.
+    """
+    require_choice("scene_set", scene_set, SCENE_SETS)
+    require_choice("soil", soil, tuple(PRESETS))
+    require(scene_id >= 0, f"scene_id={scene_id} is negative; scenes are numbered from 0")
+    # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
+    stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
+    pile_rng, pose_rng, look_rng = (np.random.default_rng(s) for s in stream.spawn(3))
+    heights_m, targets = _draw_pile_with_targets(pile_rng, soil)
+    return Scene(
+        scene_set=scene_set,
+        scene_id=scene_id,
+        soil=soil,
+        heights_m=heights_m,
+        joint_pos=_draw_joint_pos(pose_rng),
+        appearance=draw_appearance(look_rng),
+        targets=targets,
+    )
+
+
+def _draw_pile_with_targets(rng: np.random.Generator, soil: str) -> tuple[np.ndarray, tuple[Target, ...]]:
+    """Draw piles until one offers all its targets."""
+    x_w, y_w = cell_centres_w()
+    parameters = PRESETS[soil]
+    for _ in range(_PILE_TRIES):
+        heights_m = draw_pile(
+            rng, x_w=x_w, y_w=y_w, repose_tan=parameters.repose_tan, density_kg_m3=parameters.density_kg_m3
+        )
+        try:
+            return heights_m, find_targets(heights_m, x_w, y_w, rng)
+        except TooFewTargetsError:
+            continue
+    raise ExcavError(f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene")
+
+
+def _draw_joint_pos(rng: np.random.Generator) -> np.ndarray:
+    """Draw a pose between pile and box, bucket raised: where the previous cycle would have left the machine."""
+    while True:
+        joint_pos = inverse(
+            radius_m=rng.uniform(4.0, 5.0),
+            height_m=rng.uniform(2.0, 2.6),
+            pitch_rad=rng.uniform(-2.2, -1.4),
+            swing_rad=rng.uniform(0.5, 1.2),
+        )
+        if joint_pos is not None:
+            return joint_pos

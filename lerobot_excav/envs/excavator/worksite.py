@@ -1,0 +1,59 @@
+"""The worksite: machine, soil and target box, advanced together one tick at a time."""
+
+import numpy as np
+
+from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.excavator.machine import ExcavatorMachine
+from lerobot_excav.envs.excavator.scene import SOIL_CELL_SIZE_M, Scene
+from lerobot_excav.envs.soil import Reaction, Soil, Tool
+
+TICK_S = 0.02
+"""Step of soil and control [s] (paper)."""
+
+
+class Worksite:
+    """Machine, soil and target box.
+
+    Args:
+        soil: Name of the soil preset.
+    """
+
+    def __init__(self, *, soil: str = "sand") -> None:
+        self.machine = ExcavatorMachine(container=TARGET_BOX, terrain_shape_m=DIG_AREA_EXTENT_M)
+        self.soil = Soil(
+            preset=soil, extent_m=DIG_AREA_EXTENT_M, cell_size_m=SOIL_CELL_SIZE_M, container=TARGET_BOX
+        )
+        self.time_s = 0.0
+        self._ticks = 0
+
+    def reset(self, scene: Scene) -> None:
+        """Restore the start of a scene exactly."""
+        self.machine.set_appearance(scene.appearance)
+        self.machine.reset(scene.joint_pos)
+        self.soil.reset(scene.heights_m)
+        self._ticks, self.time_s = 0, 0.0
+
+    def tick(self, action: np.ndarray) -> Reaction:
+        """Advance by `TICK_S` under joystick commands.
+
+        Args:
+            action: Swing, boom, arm, bucket in [-1, 1], shape (4,).
+
+        Returns:
+            What the soil did to the bucket during the tick.
+        """
+        reaction = self.soil.step(TICK_S, self.machine.tool())
+        self.machine.tick(action, reaction)
+        self._ticks += 1
+        self.time_s = self._ticks * TICK_S
+        return reaction
+
+    @property
+    def tool(self) -> Tool:
+        """The bucket as the soil sees it."""
+        return self.machine.tool()
+
+    @property
+    def box_mass_kg(self) -> float:
+        """Soil in the target box [kg]."""
+        return self.soil.ledger_kg()["box"]
