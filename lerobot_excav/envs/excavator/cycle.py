@@ -2,10 +2,11 @@
 
 from typing import Any
 
+from lerobot_excav.envs.excavator.constants import TICK_S
 from lerobot_excav.envs.excavator.scene import Scene
 from lerobot_excav.envs.excavator.targets import Target
 from lerobot_excav.envs.excavator.task_state import TaskMeter, TaskState
-from lerobot_excav.envs.excavator.worksite import TICK_S, Worksite
+from lerobot_excav.envs.excavator.worksite import Worksite
 
 LOADING_ONSET_KG = 20.0
 """Payload at which a bucket counts as loading, and below which it counts as emptied [kg] (design §6)."""

@@ -6,19 +6,24 @@ import gymnasium as gym
 import numpy as np
 
 from lerobot_excav.envs.excavator.cycle import DigCycle
-from lerobot_excav.envs.excavator.mask_condition import MASK_CONDITIONS, conditioned_mask
+from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
-from lerobot_excav.envs.excavator.scene import SCENE_SETS, Scene, draw_scene
+from lerobot_excav.envs.excavator.scene import Scene, draw_scene
 from lerobot_excav.envs.excavator.targets import TARGET_COUNT, Target, target_mask_img
-from lerobot_excav.envs.excavator.worksite import TICK_S, Worksite
-from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.envs.excavator.worksite import Worksite
+from lerobot_excav.envs.settings import (
+    MASK_CONDITIONS,
+    SCENE_SETS,
+    SOILS,
+    TICKS_PER_SECOND,
+    require_fps,
+    require_image_size,
+    require_task,
+)
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
-TASKS = ("Scoop-v0",)
 OBS_TYPES = ("pixels_agent_pos", "agent_pos")
 TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
-TICKS_PER_SECOND = round(1.0 / TICK_S)
-LEAST_IMAGE_SIZE = 32
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
 FULL_BUCKET_KG = 485.0
@@ -53,7 +58,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
     Termination: the cycle is complete (bucket emptied into the box). Truncation: the time limit `episode_length`.
 
     Args:
-        task: One of `TASKS`.
+        task: One of `settings.TASKS`.
         obs_type: `pixels_agent_pos`, or `agent_pos` to leave the pictures out (several times faster).
         observation_height: Image height H [px].
         observation_width: Image width W [px].
@@ -81,14 +86,15 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
         soil: str = "sand",
         render_mode: str | None = "rgb_array",
     ) -> None:
-        require_choice("task", task, TASKS)
+        require_task("task", task)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
-        require_choice("soil", soil, tuple(PRESETS))
+        require_choice("soil", soil, SOILS)
         require_choice("render_mode", render_mode, ("rgb_array", None))
-        require_frame_rate(fps)
-        require_image_size(observation_height, observation_width)
+        require_fps("fps", fps)
+        require_image_size("observation_height", observation_height)
+        require_image_size("observation_width", observation_width)
         require(episode_length >= 1, f"episode_length={episode_length} must be at least 1 frame")
         self.task, self.task_description = task, TASK_DESCRIPTION
         self.scene_set, self.mask_condition, self.soil_name = scene_set, mask_condition, soil
@@ -274,21 +280,6 @@ def require_action(action: np.ndarray) -> np.ndarray:
         bool(np.isfinite(command).all()), f"action={command.tolist()} is not finite; check the policy's statistics"
     )
     return np.clip(command, -1.0, 1.0)
-
-
-def require_frame_rate(fps: int) -> None:
-    """Raise `ConfigurationError` unless a frame lasts a whole number of ticks."""
-    divisors = [f for f in range(1, TICKS_PER_SECOND + 1) if TICKS_PER_SECOND % f == 0]
-    require_choice("fps", fps, divisors, hint=f"A frame must last a whole number of {TICK_S} s ticks.")
-
-
-def require_image_size(height: int, width: int) -> None:
-    """Raise `ConfigurationError` unless pictures are large enough to show a target."""
-    for field, size in (("observation_height", height), ("observation_width", width)):
-        require(
-            LEAST_IMAGE_SIZE <= size <= 1024,
-            f"{field}={size} px is out of range; allowed: {LEAST_IMAGE_SIZE} to 1024 (the default is 96 x 128)",
-        )
 
 
 def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:

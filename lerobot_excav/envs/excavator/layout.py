@@ -2,12 +2,8 @@
 
 import numpy as np
 
+from lerobot_excav.envs.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.soil import Container
-
-# Decided here (kind: design): the pile is centred 4.6 m in front of the swing axis, so that all of it lies between the
-# machine's least radius (about 1.6 m at ground) and its reach at ground (6.9 m).
-MACHINE_POS_W = np.array([-4.6, 0.0, 0.0])
-"""Point on the floor below the swing axis [m], shape (3,), world frame."""
 
 DIG_AREA_EXTENT_M = (6.0, 6.0)
 """Size of the soil grid along x and y [m], centred on the world origin."""
@@ -34,4 +30,4 @@ def world_from_cylinder(radius_m: np.ndarray, swing_rad: np.ndarray) -> np.ndarr
     """Return the ground-plane points (..., 2) [m] at given radii and swing angles of the machine."""
     radius, swing = np.broadcast_arrays(radius_m, swing_rad)
     offset = np.stack([radius * np.cos(swing), radius * np.sin(swing)], axis=-1)
-    return offset + MACHINE_POS_W[:2]
+    return offset + np.asarray(MACHINE_POS_W[:2])

@@ -6,8 +6,6 @@ import numpy as np
 
 from lerobot_excav.errors import ExcavError
 
-MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
-
 _SHIFT_TRIES = 1000
 
 

@@ -9,10 +9,10 @@ from lerobot_excav.envs.excavator.kinematics import inverse
 from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M
 from lerobot_excav.envs.excavator.pile import draw_pile
 from lerobot_excav.envs.excavator.targets import Target, TooFewTargetsError, find_targets
+from lerobot_excav.envs.settings import SCENE_SETS, SOILS
 from lerobot_excav.envs.soil import PRESETS
 from lerobot_excav.errors import ExcavError, require, require_choice
 
-SCENE_SETS = ("train", "val", "test")
 SOIL_CELL_SIZE_M = 0.05
 
 # Names this family of random streams; changing it changes every scene, so it changes with the scene's definition only.
@@ -54,7 +54,7 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
     """Draw a scene; the same arguments give the same scene, byte for byte.
 
     Args:
-        scene_set: One of `SCENE_SETS`. No scene of one set can occur in another.
+        scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
         scene_id: Any integer from 0.
         soil: Name of the soil preset, which sets slope and density of the pile.
 
@@ -65,7 +65,7 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
         ConfigurationError: An argument is not one of the allowed values.
     """
     require_choice("scene_set", scene_set, SCENE_SETS)
-    require_choice("soil", soil, tuple(PRESETS))
+    require_choice("soil", soil, SOILS)
     require(scene_id >= 0, f"scene_id={scene_id} is negative; scenes are numbered from 0")
     # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
@@ -88,7 +88,7 @@ def _draw_pile_with_targets(rng: np.random.Generator, soil: str) -> tuple[np.nda
     parameters = PRESETS[soil]
     for _ in range(_PILE_TRIES):
         heights_m = draw_pile(
-            rng, x_w=x_w, y_w=y_w, repose_tan=parameters.repose_tan, density_kg_m3=parameters.density_kg_m3
+            rng, x_w=x_w, y_w=y_w, repose_tan=parameters.slope_tan, density_kg_m3=parameters.density_kg_m3
         )
         try:
             return heights_m, find_targets(heights_m, x_w, y_w, rng)
@@ -104,7 +104,7 @@ def _draw_joint_pos(rng: np.random.Generator) -> np.ndarray:
             radius_m=rng.uniform(4.0, 5.0),
             height_m=rng.uniform(2.0, 2.6),
             pitch_rad=rng.uniform(-2.2, -1.4),
-            swing_rad=rng.uniform(0.5, 1.2),
+            swing=rng.uniform(0.5, 1.2),
         )
         if joint_pos is not None:
             return joint_pos

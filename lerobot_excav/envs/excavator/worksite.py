@@ -2,13 +2,11 @@
 
 import numpy as np
 
+from lerobot_excav.envs.excavator.constants import TICK_S
 from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.excavator.scene import SOIL_CELL_SIZE_M, Scene
 from lerobot_excav.envs.soil import Reaction, Soil, Tool
-
-TICK_S = 0.02
-"""Step of soil and control [s] (paper)."""
 
 
 class Worksite:

@@ -1,0 +1,51 @@
+# Every target sets up what it needs; on a fresh machine only Python 3.12 and git have to be there.
+# `make PYTHON=/path/to/python3.12 …` chooses the interpreter, `make help` lists the targets.
+
+PYTHON ?= python3.12
+VENV := .venv
+UV := $(VENV)/bin/uv
+RUN := $(VENV)/bin
+READY := $(VENV)/.ready
+DEMO := outputs/demo
+
+# No GPU and no display are needed: pictures come from EGL. LeRobot asks no hub for anything.
+export MUJOCO_GL ?= egl
+export HF_HUB_OFFLINE ?= 1
+export TOKENIZERS_PARALLELISM := false
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint type wheel clean
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+
+setup: $(READY) ## install everything into .venv
+
+$(READY): pyproject.toml uv.lock
+	@command -v $(PYTHON) >/dev/null 2>&1 && $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] < (3, 12))' || { \
+	  echo "make: no Python 3.12 found as '$(PYTHON)'."; \
+	  echo "  Debian 13, Ubuntu 24.04: sudo apt-get install python3.12 python3.12-venv"; \
+	  echo "  macOS: brew install python@3.12      anywhere: pyenv install 3.12 or https://www.python.org/downloads/"; \
+	  echo "  Then run make again, or name it: make PYTHON=/path/to/python3.12 …"; exit 1; }
+	@test -x $(UV) || { $(PYTHON) -m venv $(VENV) && $(VENV)/bin/python -m pip install --quiet "uv>=0.5"; }
+	@echo "Installing into $(VENV) (LeRobot, PyTorch and MuJoCo: several GB the first time) …"
+	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact
+	@touch $@
+
+demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)
+	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
+
+test: $(READY) ## run the test suite
+	@$(RUN)/pytest -n 2
+
+lint: $(READY) ## check style
+	@$(RUN)/ruff check . && $(RUN)/ruff format --check .
+
+type: $(READY) ## check types
+	@$(RUN)/mypy
+
+wheel: $(READY) ## build the wheel
+	@$(RUN)/python -m build --wheel --no-isolation
+
+clean: ## remove what the targets above made
+	rm -rf $(VENV) outputs build dist

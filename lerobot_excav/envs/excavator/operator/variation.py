@@ -1,0 +1,73 @@
+"""How one human-like operator's cycle differs from the next."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """Style of one cycle; every range below is a guess at how practised people differ.
+
+    Attributes:
+        speed: Fraction of the machine's speed that is used.
+        entry_along_m: Where the edge enters the soil, along the boom from the centre of the patch [m].
+        entry_across_m: The same across the boom [m].
+        depth_m: Depth of cut [m].
+        attack_pitch_rad: Preferred pitch of the bucket chord at entry [rad].
+        carry_height_m: Height of the bucket pin above the box [m].
+        dump_along_m: Where the load is dropped, along the boom from the centre of the box [m].
+        pauses_s: Rest before each phase [s], shape (phases,).
+        tremor: Size of the slow noise on the commands, as a fraction of full stick.
+    """
+
+    speed: float
+    entry_along_m: float
+    entry_across_m: float
+    depth_m: float
+    attack_pitch_rad: float
+    carry_height_m: float
+    dump_along_m: float
+    pauses_s: tuple[float, ...]
+    tremor: float
+
+
+def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
+    """Draw the style of one cycle.
+
+    Args:
+        rng: Source of the style.
+        phase_count: Number of phases that get a pause of their own.
+    """
+    return Variation(
+        speed=rng.uniform(0.85, 1.0),
+        entry_along_m=rng.uniform(0.0, 0.16),
+        entry_across_m=rng.uniform(-0.1, 0.1),
+        depth_m=rng.uniform(0.36, 0.46),
+        attack_pitch_rad=rng.uniform(-1.75, -1.45),
+        carry_height_m=rng.uniform(1.5, 1.7),
+        dump_along_m=rng.uniform(-0.15, 0.15),
+        # Most pauses are short, a few are noticeable.
+        pauses_s=tuple(np.minimum(rng.exponential(0.06, phase_count), 0.3)),
+        tremor=rng.uniform(0.0, 0.03),
+    )
+
+
+class Tremor:
+    """Slow noise of a hand on a joystick: an Ornstein-Uhlenbeck process per axis.
+
+    Args:
+        rng: Source of the noise.
+        size: Standard deviation as a fraction of full stick.
+        time_constant_s: How long the noise remembers itself [s] (kind: guess).
+    """
+
+    def __init__(self, rng: np.random.Generator, *, size: float, time_constant_s: float = 0.4) -> None:
+        self._rng, self._size, self._time_constant_s = rng, size, time_constant_s
+        self._value = np.zeros(4)
+
+    def step(self, dt_s: float) -> np.ndarray:
+        """Return the noise after a further `dt_s`, shape (4,)."""
+        keep = np.exp(-dt_s / self._time_constant_s)
+        self._value = keep * self._value + self._size * np.sqrt(1.0 - keep**2) * self._rng.standard_normal(4)
+        return self._value
