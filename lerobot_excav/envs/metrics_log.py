@@ -1,0 +1,113 @@
+"""The metrics file: one JSON object per finished episode of an evaluation.
+
+LeRobot keeps rewards and success only. This file keeps the rest, written by the main process, in the order
+in which LeRobot counts: line `i` of an evaluation is `per_episode[i]` of its `eval_info.json`.
+
+    {"episode_ix": 0, "seed": 1000, "task": "Scoop-v0", "scene_set": "test", "mask_condition": "correct",
+     "soil": "sand", "fps": 10, "scene_id": 1000, "target_id": 0, "success": true, ...}
+
+followed by every entry of the environment's `episode_metrics`. A number that does not exist, such as the
+distance at a loading that never began, is `null`.
+
+LeRobot runs whole batches: with `--eval.n_episodes=5 --eval.batch_size=3` it runs six episodes and drops
+the last. `episode_ix` tells them apart, and `max_episodes` leaves them out. Every evaluation of a training
+run appends, and starts again at `episode_ix` 0.
+"""
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lerobot_excav.errors import ConfigurationError
+
+
+class MetricsLog:
+    """Collect the episodes of a batch and append them, in order, once all have finished.
+
+    Args:
+        path: File to append to; its folder is made.
+        n_envs: Environments in a batch.
+        max_episodes: Episodes of the evaluation to write; None writes all.
+
+    Attributes:
+        common: Entries that every line shares.
+
+    Raises:
+        ConfigurationError: The file cannot be written.
+    """
+
+    def __init__(self, path: Path, *, n_envs: int, max_episodes: int | None = None) -> None:
+        self.path = Path(path)
+        self.common: dict[str, Any] = {}
+        self._max_episodes = max_episodes
+        self._n_envs = n_envs
+        self._batch = -1
+        self._seeds: Sequence[int | None] = [None] * n_envs
+        self._finished: dict[int, dict[str, Any]] = {}
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._append([])
+        except OSError as error:
+            raise ConfigurationError(
+                f"env.metrics_path={str(path)!r} cannot be written ({error.strerror}); "
+                "give a file in a folder of your own."
+            ) from error
+
+    def begin_batch(self, seeds: Sequence[int | None]) -> None:
+        """Start the next batch of one episode per environment.
+
+        A batch that was interrupted is dropped, as LeRobot does not count it either.
+
+        Args:
+            seeds: Seed of each environment, length `n_envs`.
+        """
+        self._batch += 1
+        self._seeds = seeds
+        self._finished = {}
+
+    def finish_episode(self, env_index: int, info: Mapping[str, Any]) -> None:
+        """Record an episode; later calls for the same environment and batch change nothing.
+
+        Args:
+            env_index: Position of the environment in the batch.
+            info: Information of the last step: `is_success`, `scene_id`, `target_id`, `episode_metrics`.
+        """
+        if self._batch < 0 or env_index in self._finished:
+            return
+        self._finished[env_index] = self._line(env_index, info)
+        if len(self._finished) == self._n_envs:
+            self._append([self._finished[i] for i in range(self._n_envs)])
+
+    def _line(self, env_index: int, info: Mapping[str, Any]) -> dict[str, Any]:
+        line = {
+            "episode_ix": self._batch * self._n_envs + env_index,
+            "seed": self._seeds[env_index],
+            **self.common,
+            "scene_id": info["scene_id"],
+            "target_id": info["target_id"],
+            "success": info["is_success"],
+            **info["episode_metrics"],
+        }
+        return {key: _plain(value) for key, value in line.items()}
+
+    def _append(self, lines: list[dict[str, Any]]) -> None:
+        """Append whole lines by one write each, so that two evaluations may share a file."""
+        descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+        try:
+            for line in lines:
+                if self._max_episodes is None or line["episode_ix"] < self._max_episodes:
+                    os.write(descriptor, (json.dumps(line, allow_nan=False) + "\n").encode())
+        finally:
+            os.close(descriptor)
+
+
+def _plain(value: Any) -> Any:
+    """Turn NumPy scalars into Python's own, and numbers that JSON lacks into None."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

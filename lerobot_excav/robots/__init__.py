@@ -1,0 +1,1 @@
+"""Simulated machines as LeRobot robots, for recording, replay, teleoperation and rollout."""

@@ -1,0 +1,1 @@
+"""LeRobot teleoperators that drive the excavator: a gamepad, and the scripted operator."""

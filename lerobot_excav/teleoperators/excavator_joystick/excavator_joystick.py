@@ -1,0 +1,112 @@
+"""A gamepad as a LeRobot teleoperator of the excavator."""
+
+from collections.abc import Callable
+from typing import Any, override
+
+from lerobot.teleoperators.teleoperator import Teleoperator
+
+from lerobot_excav.errors import DeviceError
+from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES, NEXT_SCENE, REINITIALISE
+from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
+from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
+from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping
+
+
+class ExcavatorJoystick(Teleoperator):
+    """Drive the excavator with the two sticks of a gamepad.
+
+    Args:
+        config: Device, control pattern and response.
+        open_device: Opens the device that the configuration names.
+    """
+
+    config_class = ExcavatorJoystickConfig
+    name = "excavator_joystick"
+
+    def __init__(
+        self, config: ExcavatorJoystickConfig, *, open_device: Callable[..., Gamepad] = open_gamepad
+    ) -> None:
+        super().__init__(config)
+        self.config = config
+        self._open_device = open_device
+        self._device: Gamepad | None = None
+        self._presses = PressDetector()
+        self._mapping = StickMapping(
+            pattern=config.pattern, dead_zone=config.dead_zone, expo=config.expo, invert=tuple(config.invert)
+        )
+
+    @property
+    def action_features(self) -> dict[str, type]:
+        """Joystick commands in [-1, 1], as the robot takes them; the keys of the buttons are not recorded."""
+        return dict.fromkeys(ACTION_NAMES, float)
+
+    @property
+    def feedback_features(self) -> dict[str, type]:
+        """None."""
+        return {}
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a device is open."""
+        return self._device is not None
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Always: SDL calibrates gamepads."""
+        return True
+
+    @override
+    def connect(self, calibrate: bool = True) -> None:
+        """Open the device.
+
+        Raises:
+            DeviceError: The device is missing, unknown to SDL and not numbered, or open already.
+        """
+        if self._device is not None:
+            raise DeviceError(
+                f"the gamepad {self._device.name!r} is connected already; call disconnect() first."
+            )
+        self._device = self._open_device(
+            index=self.config.device_index,
+            name=self.config.device_name,
+            buttons=self.config.buttons,
+            joystick_axes=self.config.joystick_axes,
+            joystick_buttons=self.config.joystick_buttons,
+        )
+        self._presses = PressDetector()
+
+    def calibrate(self) -> None:
+        """Do nothing: SDL calibrates gamepads."""
+
+    def configure(self) -> None:
+        """Do nothing: the configuration is complete when the teleoperator is made."""
+
+    def get_action(self) -> dict[str, float]:
+        """Return the commands of the four joints, and a key for each button that was just pressed.
+
+        Raises:
+            DeviceError: No device is open, or it is gone. Commands are never repeated.
+        """
+        if self._device is None:
+            raise DeviceError("the gamepad is not connected; call connect() first.")
+        axes, buttons = self._device.read()
+        command = self._mapping.command(axes)
+        action = dict(zip(ACTION_NAMES, command.values(), strict=True))
+        for button, key in zip(self.config.buttons, (REINITIALISE, NEXT_SCENE), strict=True):
+            if self._presses.pressed(button, is_down=buttons[button]):
+                action[key] = 1.0
+        return action
+
+    def send_feedback(self, feedback: dict[str, Any]) -> None:
+        """Do nothing: the gamepad gets no feedback."""
+
+    def disconnect(self) -> None:
+        """Let go of the device.
+
+        Raises:
+            DeviceError: No device is open.
+        """
+        if self._device is None:
+            raise DeviceError("the gamepad is not connected.")
+        self._device.close()
+        self._device = None

@@ -1,0 +1,188 @@
+"""Gamepads and joysticks, read through SDL (pygame), with axes and buttons by name.
+
+SDL's controller database knows where every axis of a known gamepad is; the numbers of a plain joystick differ
+from model to model (axis 3 is the right stick's x on one pad and its y on another), so they are used only
+when the configuration gives them.
+"""
+
+import os
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from lerobot_excav.errors import DeviceError
+from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES
+
+_FULL_DEFLECTION = 32767  # SDL reports controller axes as 16-bit integers
+
+_SDL_AXES = {"left_x": "LEFTX", "left_y": "LEFTY", "right_x": "RIGHTX", "right_y": "RIGHTY"}
+
+
+class Gamepad(Protocol):
+    """What the teleoperator needs of a device."""
+
+    name: str
+
+    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+        """Return the position of every axis in [-1, 1] and whether each button in use is down.
+
+        Raises:
+            DeviceError: The device is gone.
+        """
+
+    def close(self) -> None:
+        """Let go of the device."""
+
+
+class KnownGamepad:
+    """A device that SDL knows as a gamepad.
+
+    Args:
+        pygame: The pygame module.
+        controller: The device, a `pygame._sdl2.controller.Controller`.
+        buttons: Names of the buttons in use.
+    """
+
+    def __init__(self, pygame: Any, controller: Any, buttons: tuple[str, ...]) -> None:
+        self.name = str(controller.name)
+        self._pygame, self._controller = pygame, controller
+        self._axes = {axis: getattr(pygame, f"CONTROLLER_AXIS_{_SDL_AXES[axis]}") for axis in AXES}
+        self._buttons = {name: getattr(pygame, f"CONTROLLER_BUTTON_{name.upper()}") for name in buttons}
+
+    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+        """Return axes and buttons; see `Gamepad.read`."""
+        self._pygame.event.get()  # updates the device; emptied, or the queue fills up and drops news
+        if not self._controller.attached():
+            raise lost(self.name)
+        axes = {axis: self._controller.get_axis(i) / _FULL_DEFLECTION for axis, i in self._axes.items()}
+        return axes, {name: bool(self._controller.get_button(i)) for name, i in self._buttons.items()}
+
+    def close(self) -> None:
+        """Let go of the device."""
+        self._controller.quit()
+
+
+class PlainJoystick:
+    """A device whose axes and buttons the configuration numbers.
+
+    Args:
+        pygame: The pygame module.
+        joystick: The device, a `pygame.joystick.Joystick`.
+        axes: Number of each axis.
+        buttons: Number of each button in use.
+
+    Raises:
+        DeviceError: The device has fewer axes or buttons than the configuration numbers.
+    """
+
+    def __init__(
+        self, pygame: Any, joystick: Any, axes: Mapping[str, int], buttons: Mapping[str, int]
+    ) -> None:
+        self.name = str(joystick.get_name())
+        self._pygame, self._joystick, self._axes, self._buttons = pygame, joystick, axes, buttons
+        self._instance_id = joystick.get_instance_id()
+        for field, numbers, count in (
+            ("joystick_axes", axes, joystick.get_numaxes()),
+            ("joystick_buttons", buttons, joystick.get_numbuttons()),
+        ):
+            beyond = {name: number for name, number in numbers.items() if number >= count}
+            if beyond:
+                raise DeviceError(
+                    f"teleop.{field}: {beyond} do not exist; {self.name!r} has {count}, from 0."
+                )
+
+    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+        """Return axes and buttons; see `Gamepad.read`."""
+        # SDL keeps answering with the last values of a joystick that is gone; only its events say so.
+        for event in self._pygame.event.get():
+            if event.type == self._pygame.JOYDEVICEREMOVED and event.instance_id == self._instance_id:
+                self._joystick = None
+        if self._joystick is None:
+            raise lost(self.name)
+        axes = {axis: float(self._joystick.get_axis(i)) for axis, i in self._axes.items()}
+        return axes, {name: bool(self._joystick.get_button(i)) for name, i in self._buttons.items()}
+
+    def close(self) -> None:
+        """Let go of the device."""
+        if self._joystick is not None:
+            self._joystick.quit()
+
+
+def open_gamepad(
+    *,
+    index: int,
+    name: str | None,
+    buttons: tuple[str, ...],
+    joystick_axes: Mapping[str, int] | None,
+    joystick_buttons: Mapping[str, int] | None,
+) -> Gamepad:
+    """Open the chosen device.
+
+    Args:
+        index: Position among the connected devices; used when `name` is None.
+        name: Part of the device's name, any case.
+        buttons: Names of the buttons in use.
+        joystick_axes: Number of each axis, for a device that SDL does not know as a gamepad.
+        joystick_buttons: Number of each button in use, for such a device.
+
+    Raises:
+        DeviceError: There is no such device, or it is a joystick that SDL does not know and the
+            configuration does not number.
+    """
+    pygame, sdl_controller = _start_sdl()
+    found = [pygame.joystick.Joystick(i).get_name() for i in range(pygame.joystick.get_count())]
+    chosen = choose_device(found, index=index, name=name)
+    if sdl_controller.is_controller(chosen):
+        return KnownGamepad(pygame, sdl_controller.Controller(chosen), buttons)
+    joystick = pygame.joystick.Joystick(chosen)
+    if joystick_axes is None or joystick_buttons is None:
+        raise DeviceError(
+            f"SDL does not know {found[chosen]!r} as a gamepad ({joystick.get_numaxes()} axes, "
+            f"{joystick.get_numbuttons()} buttons), so its axes have no names. Number them, for example "
+            "--teleop.joystick_axes='{left_x: 0, left_y: 1, right_x: 3, right_y: 4}' "
+            f"--teleop.joystick_buttons='{{{buttons[0]}: 6, {buttons[1]}: 7}}', or give SDL a mapping in the "
+            "environment variable SDL_GAMECONTROLLERCONFIG."
+        )
+    return PlainJoystick(pygame, joystick, joystick_axes, joystick_buttons)
+
+
+def choose_device(found: list[str], *, index: int, name: str | None) -> int:
+    """Return the position of the wanted device.
+
+    Args:
+        found: Names of the connected devices.
+        index: Position wanted, when `name` is None.
+        name: Part of the name wanted, any case; the first match counts.
+
+    Raises:
+        DeviceError: There is no such device.
+    """
+    matches = [i for i, each in enumerate(found) if name is None or name.lower() in each.lower()]
+    if name is None and index < len(found):
+        return index
+    if name is not None and matches:
+        return matches[0]
+    wanted = f"teleop.device_index={index}" if name is None else f"teleop.device_name={name!r}"
+    listed = ", ".join(f"{i}: {each!r}" for i, each in enumerate(found)) or "none"
+    raise DeviceError(
+        f"no gamepad for {wanted}; connected: {listed}. Plug one in, check that you may read /dev/input, or "
+        "use --teleop.type=excavator_operator, which needs none."
+    )
+
+
+def lost(name: str) -> DeviceError:
+    """Return the error for a device that was unplugged or ran out of power."""
+    return DeviceError(f"the gamepad {name!r} is gone; plug it in again and start the command anew.")
+
+
+def _start_sdl() -> tuple[Any, Any]:
+    """Start SDL's joystick part without a window."""
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # there is no window to have the focus
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    import pygame
+    from pygame._sdl2 import controller
+
+    pygame.display.init()  # events need it
+    pygame.joystick.init()
+    controller.init()
+    return pygame, controller

@@ -1,0 +1,93 @@
+"""From sticks to joystick commands: control pattern, dead-zone and response. Pure functions of numbers.
+
+Stick axes are named `left_x`, `left_y`, `right_x`, `right_y`; x is positive to the right and y positive
+towards the operator, as SDL reports them.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+AXES = ("left_x", "left_y", "right_x", "right_y")
+
+PATTERNS: Mapping[str, Mapping[str, tuple[str, float]]] = {
+    # ISO 10968: left hand swing and arm, right hand boom and bucket.
+    "iso": {
+        "swing": ("left_x", -1.0),  # lever left: swing left, which is positive
+        "boom": ("right_y", 1.0),  # lever back: boom up
+        "arm": ("left_y", -1.0),  # lever forward: arm out
+        "bucket": ("right_x", 1.0),  # lever left: curl, which is negative
+    },
+    # SAE J1814 ("backhoe"): boom and arm change hands.
+    "sae": {
+        "swing": ("left_x", -1.0),
+        "boom": ("left_y", 1.0),
+        "arm": ("right_y", -1.0),
+        "bucket": ("right_x", 1.0),
+    },
+}
+"""For each joint of a control pattern, the axis that drives it and the axis' sign."""
+
+
+def respond(value: float, *, dead_zone: float, expo: float = 0.0) -> float:
+    """Shape one axis: still within the dead-zone, then rising without a step to full deflection.
+
+    The travel outside the dead-zone is rescaled to [0, 1] and bent: u -> (1 - expo) u + expo u^3.
+
+    Args:
+        value: Deflection; beyond [-1, 1] it is clipped.
+        dead_zone: Deflection below which the answer is 0, in [0, 1).
+        expo: 0 for a straight response, 1 for the finest control near the centre.
+
+    Returns:
+        Command in [-1, 1] of the same sign.
+    """
+    travel = max(min(abs(value), 1.0) - dead_zone, 0.0) / (1.0 - dead_zone)
+    return math.copysign((1.0 - expo) * travel + expo * travel**3, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StickMapping:
+    """Turn axis positions into commands of the joints.
+
+    Attributes:
+        pattern: Name of a control pattern, `iso` or `sae`.
+        dead_zone: See `respond`.
+        expo: See `respond`.
+        invert: Axes whose sign is turned around.
+    """
+
+    pattern: str = "iso"
+    dead_zone: float = 0.08
+    expo: float = 0.0
+    invert: Collection[str] = field(default_factory=tuple)
+
+    def command(self, axes: Mapping[str, float]) -> dict[str, float]:
+        """Return the command of each joint in [-1, 1], in the order swing, boom, arm, bucket.
+
+        Args:
+            axes: Position of each axis of `AXES` in [-1, 1].
+        """
+        return {joint: self._joint_command(axes, joint) for joint in PATTERNS[self.pattern]}
+
+    def _joint_command(self, axes: Mapping[str, float], joint: str) -> float:
+        axis, sign = PATTERNS[self.pattern][joint]
+        if axis in self.invert:
+            sign = -sign
+        return sign * respond(axes[axis], dead_zone=self.dead_zone, expo=self.expo) + 0.0  # no negative zero
+
+
+class PressDetector:
+    """Report each press of a button once, however long it is held."""
+
+    def __init__(self) -> None:
+        self._was_down: dict[str, bool] = {}
+
+    def pressed(self, button: str, *, is_down: bool) -> bool:
+        """Return whether the button went down since the last call for it.
+
+        A button that is down at its first call counts as held, not pressed.
+        """
+        was_down = self._was_down.get(button, is_down)
+        self._was_down[button] = is_down
+        return is_down and not was_down
