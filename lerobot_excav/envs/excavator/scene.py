@@ -104,7 +104,7 @@ def _draw_joint_pos(rng: np.random.Generator) -> np.ndarray:
             radius_m=rng.uniform(4.0, 5.0),
             height_m=rng.uniform(2.0, 2.6),
             pitch_rad=rng.uniform(-2.2, -1.4),
-            swing=rng.uniform(0.5, 1.2),
+            swing_rad=rng.uniform(0.5, 1.2),
         )
         if joint_pos is not None:
             return joint_pos

@@ -90,7 +90,7 @@ def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> np.ndarray:
             if keep == "pin":
                 radius = pose.pin_radius_m + BUCKET_LENGTH_M * np.cos(pitch)
                 height = pose.pin_height_m + BUCKET_LENGTH_M * np.sin(pitch)
-            joint_pos = inverse(radius_m=radius, height_m=height, pitch_rad=pitch, swing=pose.swing_rad)
+            joint_pos = inverse(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=pose.swing_rad)
             if joint_pos is not None:
                 return joint_pos
     raise UnreachableError(f"the bucket cannot reach {pose}")

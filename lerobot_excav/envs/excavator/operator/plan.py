@@ -131,6 +131,8 @@ def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float) -> np
         enough = np.nonzero(swept_m3 >= CUT_VOLUME_M3)[0]
         if enough.size:
             return heights[: max(int(enough[0]) + 1, 3)]
-    return heights
+    # The whole pile along this line is less than a bucket: stop where it ends.
+    last = int(np.argmax(swept_m3 >= swept_m3[-1] - 1e-9))
+    return heights[: max(last + 1, 3)]
 
 
