@@ -59,7 +59,7 @@ class DigCycle:
 
     @property
     def is_complete(self) -> bool:
-        """Whether soil has been brought to the box and the bucket has stayed empty since: nothing can change any more."""
+        """Whether soil has been brought to the box and the bucket has stayed empty since; final."""
         return self._empty_ticks >= SETTLING_TICKS
 
     @property

@@ -189,7 +189,9 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
             self.worksite.tick(command)
             cycle.update()
         self._frame += 1
-        reward = (cycle.state.deposited_mass_kg - deposited_before_kg) / FULL_BUCKET_KG + float(cycle.is_success)
+        reward = (cycle.state.deposited_mass_kg - deposited_before_kg) / FULL_BUCKET_KG + float(
+            cycle.is_success
+        )
         terminated = cycle.is_complete
         # The wrapper of gym.make says the same; this keeps an environment built by hand finite, too.
         truncated = self._frame >= self.episode_length and not terminated
@@ -275,9 +277,12 @@ def require_action(action: np.ndarray) -> np.ndarray:
         ConfigurationError: Wrong shape, NaN or infinity.
     """
     command = np.asarray(action, dtype=np.float64)
-    require(command.shape == (4,), f"action has shape {command.shape}; it must be (4,): swing, boom, arm, bucket")
     require(
-        bool(np.isfinite(command).all()), f"action={command.tolist()} is not finite; check the policy's statistics"
+        command.shape == (4,), f"action has shape {command.shape}; it must be (4,): swing, boom, arm, bucket"
+    )
+    require(
+        bool(np.isfinite(command).all()),
+        f"action={command.tolist()} is not finite; check the policy's statistics",
     )
     return np.clip(command, -1.0, 1.0)
 
@@ -286,5 +291,5 @@ def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:
     spaces: dict[str, gym.Space[Any]] = {"agent_pos": gym.spaces.Box(-np.inf, np.inf, (8,), np.float32)}
     if obs_type == "pixels_agent_pos":
         image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
-        spaces["pixels"] = gym.spaces.Dict({key: image for key in ("main", "cab", "target_mask")})
+        spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(("main", "cab", "target_mask"), image))
     return gym.spaces.Dict(spaces)

@@ -94,7 +94,9 @@ def _draw_pile_with_targets(rng: np.random.Generator, soil: str) -> tuple[np.nda
             return heights_m, find_targets(heights_m, x_w, y_w, rng)
         except TooFewTargetsError:
             continue
-    raise ExcavError(f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene")
+    raise ExcavError(
+        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene"
+    )
 
 
 def _draw_joint_pos(rng: np.random.Generator) -> np.ndarray:

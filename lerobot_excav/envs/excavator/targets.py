@@ -56,7 +56,12 @@ class Target:
 
 
 def find_targets(
-    heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray, rng: np.random.Generator, *, count: int = TARGET_COUNT
+    heights_m: np.ndarray,
+    x_w: np.ndarray,
+    y_w: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    count: int = TARGET_COUNT,
 ) -> tuple[Target, ...]:
     """Pick dig regions that are reachable, hold enough soil and lie apart from each other.
 
@@ -83,7 +88,9 @@ def find_targets(
                 picked.append(candidate)
             if len(picked) == count:
                 return tuple(picked)
-    raise TooFewTargetsError(f"the pile has room for {len(picked)} dig regions, {count} are wanted; draw another pile")
+    raise TooFewTargetsError(
+        f"the pile has room for {len(picked)} dig regions, {count} are wanted; draw another pile"
+    )
 
 
 def target_mask_img(target: Target, terrain_points_w: np.ndarray) -> np.ndarray:
@@ -115,7 +122,9 @@ def _feasible_targets(heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray) -
             center_w = np.array([x_w[ix], y_w[iy], heights_m[ix, iy]])
             radius, swing, _ = cylinder_from_world(center_w)
             target = Target(center_w=center_w, yaw_rad=swing)
-            if RADIUS_RANGE_M[0] <= radius <= RADIUS_RANGE_M[1] and _has_enough_soil(target, heights_m, x_w, y_w):
+            if RADIUS_RANGE_M[0] <= radius <= RADIUS_RANGE_M[1] and _has_enough_soil(
+                target, heights_m, x_w, y_w
+            ):
                 feasible.append(target)
     return feasible
 

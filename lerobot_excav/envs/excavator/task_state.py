@@ -20,7 +20,7 @@ TASK_STATE_NAMES = (
     "spill_before_target_events",
 )
 
-# Thresholds of the events (source: the public testbed described in reference notes on the paper's code family; kind: paper).
+# Thresholds of the events (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
 HARD_CONTACT_FORCE_N = 5000.0
 SPILL_LEAST_PAYLOAD_KG = 50.0
 SPILL_LEAST_DROP_KG = 5.0
@@ -64,7 +64,11 @@ class TaskMeter:
 
     def update(self) -> TaskState:
         """Take in the tick that has just passed and return the state."""
-        state, previous_bucket_kg, previous_box_kg = self.state, self.state.bucket_mass_kg, self.state.deposited_mass_kg
+        state, previous_bucket_kg, previous_box_kg = (
+            self.state,
+            self.state.bucket_mass_kg,
+            self.state.deposited_mass_kg,
+        )
         state.bucket_mass_kg = self._worksite.soil.payload_mass_kg
         state.deposited_mass_kg = max(0.0, self._worksite.box_mass_kg - self._box_mass_start_kg)
         # Soil that leaves the bucket and enters it again counts twice, as in the definition this follows.

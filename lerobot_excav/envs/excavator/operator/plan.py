@@ -134,5 +134,3 @@ def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float) -> np
     # The whole pile along this line is less than a bucket: stop where it ends.
     last = int(np.argmax(swept_m3 >= swept_m3[-1] - 1e-9))
     return heights[: max(last + 1, 3)]
-
-
