@@ -1,0 +1,37 @@
+"""Poses of the two cameras."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraPose:
+    """Where a camera stands and what it looks at; its upper edge points up.
+
+    Attributes:
+        position: Eye point (3,) [m], in the frame of the body that carries the camera.
+        target: A point on the optical axis (3,) [m], same frame.
+        fovy_deg: Vertical field of view [degrees].
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    fovy_deg: float
+
+
+MAIN = CameraPose(position=(2.6, -6.6, 5.2), target=(-1.05, 0.75, 0.35), fovy_deg=46.0)
+"""Fixed to the world: the whole dig area, the machine and the target box, from the front right."""
+
+CAB = CameraPose(position=(0.35, 0.35, 1.95), target=(4.6, 0.0, -0.6), fovy_deg=62.0)
+"""Fixed to the house (swing frame, origin on the slewing ring): along the boom down to the dig area."""
+
+
+def axes(pose: CameraPose) -> NDArray[np.float64]:
+    """Return the rotation (3, 3) whose columns are the camera's right, up and backward axes."""
+    backward = np.subtract(pose.position, pose.target)
+    backward = backward / np.linalg.norm(backward)
+    right = np.cross((0.0, 0.0, 1.0), backward)
+    right = right / np.linalg.norm(right)
+    return np.column_stack([right, np.cross(backward, right), backward])
