@@ -13,6 +13,7 @@ so no simulator is loaded here.
 """
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
@@ -22,4 +23,5 @@ __all__ = [
     "ExcavatorJoystickConfig",
     "ExcavatorOperatorConfig",
     "ExcavatorSimConfig",
+    "MaskACTConfig",
 ]

@@ -19,7 +19,7 @@ ACTION_SIZE = 4  # swing, boom, arm, bucket
 
 @EnvConfig.register_subclass("excavator")
 @dataclass
-class ExcavatorEnvConfig(EnvConfig):
+class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up the excavator environment from LeRobot's command line.
 
     `features` and `features_map` are derived from the other fields, whatever is given for them.

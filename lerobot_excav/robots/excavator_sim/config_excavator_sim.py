@@ -13,7 +13,7 @@ ADVANCE_MODES = ("episode", "button")
 
 @RobotConfig.register_subclass("excavator_sim")
 @dataclass(kw_only=True)
-class ExcavatorSimConfig(RobotConfig):
+class ExcavatorSimConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up the simulated excavator from LeRobot's command line.
 
     Attributes:

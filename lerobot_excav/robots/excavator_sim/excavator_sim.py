@@ -17,6 +17,7 @@ from typing import Any, override
 
 import numpy as np
 from lerobot.robots import Robot
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
@@ -38,7 +39,7 @@ logger = logging.getLogger(__name__)
 _ENDLESS = 2**31 - 1  # frames; LeRobot's commands, not the environment, end an episode
 
 
-class ExcavatorSim(Robot):
+class ExcavatorSim(Robot):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """An excavator in front of a pile, driven by `swing.vel`, `boom.vel`, `arm.vel` and `bucket.vel`.
 
     Besides these commands an action may hold `reinitialise` or `next_scene`; a value above 0.5 restarts the
@@ -170,7 +171,7 @@ class ExcavatorSim(Robot):
             **{camera: pixels[camera].copy() for camera in CAMERAS},
         }
 
-    def depth_m(self) -> np.ndarray:
+    def depth_m(self) -> NDArray[np.float32]:
         """Return the depth image registered with the main camera.
 
         Returns:
@@ -242,7 +243,7 @@ class ExcavatorSim(Robot):
         }
 
 
-def command_from_action(action: Mapping[str, Any]) -> np.ndarray:
+def command_from_action(action: Mapping[str, Any]) -> NDArray[np.float32]:
     """Take the four commands out of LeRobot's dictionary.
 
     Args:

@@ -29,7 +29,7 @@ BUTTONS = (
 
 @TeleoperatorConfig.register_subclass("excavator_joystick")
 @dataclass(kw_only=True)
-class ExcavatorJoystickConfig(TeleoperatorConfig):
+class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up a gamepad from LeRobot's command line.
 
     Attributes:

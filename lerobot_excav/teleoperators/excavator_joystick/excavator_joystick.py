@@ -12,7 +12,7 @@ from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open
 from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping
 
 
-class ExcavatorJoystick(Teleoperator):
+class ExcavatorJoystick(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Drive the excavator with the two sticks of a gamepad.
 
     Args:

@@ -9,7 +9,7 @@ from lerobot_excav.errors import require
 
 @TeleoperatorConfig.register_subclass("excavator_operator")
 @dataclass(kw_only=True)
-class ExcavatorOperatorConfig(TeleoperatorConfig):
+class ExcavatorOperatorConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up the scripted operator from LeRobot's command line.
 
     Attributes:

@@ -16,7 +16,7 @@ from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
 
 
-class ExcavatorOperator(Teleoperator):
+class ExcavatorOperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Dig where the robot's target is, load, dump, and hold still.
 
     Starts over by itself whenever the robot's scene has been reset.
