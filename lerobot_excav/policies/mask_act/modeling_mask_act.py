@@ -1,0 +1,169 @@
+"""The policy of `--policy.type=mask_act`: loss, planning and the plans in progress."""
+
+import copy
+from pathlib import Path
+from typing import Any, Self
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from lerobot.configs import PreTrainedConfig
+from lerobot.policies.act.modeling_act import ACTPolicy
+from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_STATE
+from torch import Tensor
+
+from lerobot_excav.errors import require_choice
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
+from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
+from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsemble
+from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
+
+
+class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """ACT that acts on the place that a mask of its main camera points at.
+
+    Batches hold, after the preprocessor:
+
+    | key | content |
+    |---|---|
+    | `observation.images.*` | normalised RGB of each camera, (B, 3, H, W) |
+    | `observation.images.target_mask` (`mask_key`) | target mask in [0, 1], not normalised, (B, 1 or 3, H, W) |
+    | `observation.state` | normalised robot state, (B, S), if the policy has one |
+    | `observation.environment_state` | normalised environment state, (B, E), if the policy has one |
+    | `action`, `action_is_pad` | training only: (B, chunk_size, A), (B, chunk_size) |
+
+    Args:
+        config: Settings, with the features of dataset or environment.
+        **kwargs: Statistics and metadata that LeRobot passes to every policy; not needed here.
+    """
+
+    config_class = MaskACTConfig
+    name = "mask_act"
+
+    def __init__(self, config: MaskACTConfig, **kwargs: Any) -> None:
+        # Past ACTPolicy's own constructor, which would build stock ACT's network.
+        super(ACTPolicy, self).__init__(config)
+        config.validate_features()
+        self.config = config
+        self.model = MaskACTNetwork(config)
+        self._watch = TargetWatch()
+        self._queue = ActionQueue(resolved(config.n_action_steps))
+        self._ensemble = (
+            TemporalEnsemble(config.temporal_ensemble_coeff, config.chunk_size)
+            if config.temporal_ensemble_coeff is not None
+            else None
+        )
+
+    @classmethod
+    def from_pretrained(
+        cls, pretrained_name_or_path: str | Path, *, config: MaskACTConfig | None = None, **kwargs: Any
+    ) -> Self:
+        """Load a policy from a checkpoint, without fetching the weights its backbone once started from.
+
+        Args:
+            pretrained_name_or_path: Directory of the checkpoint, or its name on the Hugging Face Hub.
+            config: Settings to use in place of the stored ones.
+            **kwargs: Passed on to LeRobot.
+        """
+        if config is None:
+            hub = {key: value for key, value in kwargs.items() if key != "strict"}
+            config = PreTrainedConfig.from_pretrained(pretrained_name_or_path, **hub)
+        if config.pretrained_path is None:
+            config = copy.copy(config)
+            config.pretrained_path = Path(pretrained_name_or_path)
+        policy: Self = super().from_pretrained(pretrained_name_or_path, config=config, **kwargs)
+        return policy
+
+    def reset(self) -> None:
+        """Forget plans and targets; call it whenever the environments are reset."""
+        self._watch.reset()
+        self._queue.reset()
+        if self._ensemble is not None:
+            self._ensemble.reset()
+
+    def forward(self, batch: Batch, reduction: str = "mean") -> tuple[Tensor, dict[str, float]]:
+        """Return the training loss: mean absolute error, plus `kl_weight` times the latent's divergence.
+
+        Args:
+            batch: Observations and demonstrated actions; left as it is.
+            reduction: "mean" over the batch (over all actions inside their episodes, as in ACT), or "none" for one
+                loss per sample, which `--sample_weighting` asks for.
+
+        Returns:
+            Loss, a scalar or shape (B,), and its parts for the log.
+
+        Raises:
+            ConfigurationError: Unknown reduction, or observations that do not fit the policy.
+        """
+        require_choice("reduction", reduction, ("mean", "none"))
+        demonstration = Demonstration(actions=batch[ACTION], is_pad=batch["action_is_pad"])
+        actions, latent = self._run(batch, demonstration if self.training else None)
+        error = F.l1_loss(actions, demonstration.actions, reduction="none").mean(dim=-1)  # (B, chunk_size)
+        valid = ~demonstration.is_pad
+        if reduction == "mean":
+            loss = (error * valid).sum() / valid.sum().clamp_min(1)
+        else:
+            loss = (error * valid).sum(dim=1) / valid.sum(dim=1).clamp_min(1)
+        parts = {"l1_loss": loss.mean().item()}
+        if latent is not None:
+            divergence = latent.kl_divergence()
+            parts["kld_loss"] = divergence.mean().item()
+            loss = loss + self.config.kl_weight * (divergence.mean() if reduction == "mean" else divergence)
+        return loss, parts
+
+    @torch.no_grad()
+    def predict_action_chunk(self, batch: Batch, **kwargs: Any) -> Tensor:
+        """Return a plan for each environment: normalised actions, shape (B, chunk_size, A)."""
+        self.eval()
+        return self._run(batch, None)[0]
+
+    @torch.no_grad()
+    def select_action(self, batch: Batch, **kwargs: Any) -> Tensor:
+        """Return the next action of each environment, shape (B, A), normalised.
+
+        An environment is planned for when its plan has run out or its mask has changed. The plans of the other
+        environments go on undisturbed.
+
+        Args:
+            batch: Observations of all environments.
+            **kwargs: Accepted for LeRobot's interface, without effect.
+
+        Raises:
+            ConfigurationError: The observations do not fit the policy, or the number of environments changed
+                without `reset`.
+        """
+        self.eval()
+        changed = self._watch.changed(target_mask(self.config, batch))
+        if self._ensemble is not None:
+            return self._ensemble.update(self.predict_action_chunk(batch), changed)
+        stale = self._queue.stale(changed)
+        if stale.any():
+            self._queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
+        return self._queue.pop()
+
+    def _run(self, batch: Batch, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
+        mask = target_mask(self.config, batch)
+        plan: tuple[Tensor, Latent | None] = self.model(
+            masked_views(self.config, batch, mask),
+            mask,
+            state=batch[OBS_STATE] if self.config.robot_state_feature else None,
+            env_state=batch[OBS_ENV_STATE] if self.config.env_state_feature else None,
+            demonstration=demonstration,
+        )
+        return plan
+
+
+def rows(batch: Batch, chosen: Tensor) -> Batch:
+    """Return the observations of some environments.
+
+    Args:
+        batch: Observations of all environments.
+        chosen: Which environments, shape (B,).
+
+    Returns:
+        New batch with the observation tensors of those environments.
+    """
+    return {
+        key: value[chosen]
+        for key, value in batch.items()
+        if key.startswith("observation.") and isinstance(value, Tensor)
+    }

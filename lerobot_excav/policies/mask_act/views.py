@@ -1,0 +1,93 @@
+"""Four-channel views: RGB of each camera, joined with the target mask or with zeros."""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from lerobot_excav.errors import require
+from lerobot_excav.policies.mask_act.configuration_mask_act import (
+    MISSING_MASK_HINT,
+    MaskACTConfig,
+    require_mask_size,
+)
+
+Batch = dict[str, Any]
+
+
+def target_mask(config: MaskACTConfig, batch: Batch) -> Tensor:
+    """Return the binary target mask, the only place where the policy reads it.
+
+    Args:
+        config: Settings of the policy; with `withhold_mask` the mask is zero whatever the batch holds.
+        batch: Observations: the mask in [0, 1] or {0, 255}, shape (B, 1 or 3, H, W), and the main camera.
+
+    Returns:
+        Mask, 0 or 1, float, shape (B, 1, H, W).
+
+    Raises:
+        ConfigurationError: The batch has no main camera or no mask, or their sizes differ.
+    """
+    require_cameras(config, batch)
+    main: Tensor = batch[config.main_camera_key]
+    if config.withhold_mask:
+        return torch.zeros_like(main[:, :1])
+    require(
+        config.mask_key in batch,
+        f"the observations have no {config.mask_key!r}; they have {image_keys(batch)}. {MISSING_MASK_HINT}",
+    )
+    mask: Tensor = batch[config.mask_key]
+    require_mask_size(config.mask_key, tuple(mask.shape[-2:]), config.main_camera_key, tuple(main.shape[-2:]))
+    # A mask stored in three equal channels is read from the first; lossy videos move its values, not its half.
+    return (mask[:, :1] > 0.5).to(main.dtype)
+
+
+def masked_views(config: MaskACTConfig, batch: Batch, mask: Tensor) -> list[Tensor]:
+    """Join the mask to the main camera and zeros to every other camera.
+
+    Args:
+        config: Settings of the policy.
+        batch: Observations with every camera of the policy, each (B, 3, H, W).
+        mask: Target mask, shape (B, 1, H, W).
+
+    Returns:
+        One (B, 4, H, W) tensor per camera, in the order of `config.camera_keys`.
+    """
+    views = []
+    for key in config.camera_keys:
+        rgb = batch[key]
+        fourth = mask if key == config.main_camera_key else torch.zeros_like(rgb[:, :1])
+        views.append(torch.cat([rgb, fourth], dim=1))
+    return views
+
+
+def require_cameras(config: MaskACTConfig, batch: Batch) -> None:
+    """Raise unless the batch holds every camera of the policy at the size it was built for.
+
+    Args:
+        config: Settings of the policy.
+        batch: Observations.
+
+    Raises:
+        ConfigurationError: A camera is missing or has another size; the message names both sides.
+    """
+    given = [key for key in image_keys(batch) if key != config.mask_key]
+    missing = [key for key in config.camera_keys if key not in batch]
+    require(
+        not missing,
+        f"the cameras do not match: the policy reads {sorted(config.camera_keys)}, the observations have "
+        f"{given}; missing: {missing}. Use the environment, robot or dataset of the training data, or "
+        "--rename_map.",
+    )
+    for key in config.camera_keys:
+        expected, shape = tuple(config.image_features[key].shape), tuple(batch[key].shape[1:])
+        require(
+            shape == expected,
+            f"{key} has shape {shape}, the policy was built for {expected} (channels, height, width); set the "
+            "environment's observation_height and observation_width, or train at this size.",
+        )
+
+
+def image_keys(batch: Batch) -> list[str]:
+    """Return the names of the images in a batch, sorted."""
+    return sorted(key for key in batch if key.startswith("observation.image"))
