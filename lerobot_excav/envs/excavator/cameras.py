@@ -21,10 +21,14 @@ class CameraPose:
     fovy_deg: float
 
 
-MAIN = CameraPose(position=(2.6, -6.6, 5.2), target=(-1.05, 0.75, 0.35), fovy_deg=46.0)
-"""Fixed to the world: the whole dig area, the machine and the target box, from the front right."""
+MAIN = CameraPose(position=(1.8, -5.5, 8.2), target=(-1.0, 0.5, 0.0), fovy_deg=51.0)
+"""Fixed to the world: the whole dig area, the machine and the target box, from the front right.
 
-CAB = CameraPose(position=(0.35, 0.35, 1.95), target=(4.6, 0.0, -0.6), fovy_deg=62.0)
+Every point of a pile is seen from more than 40 degrees above the horizontal, steeper than its slope (39 degrees for
+sand), so that no dig region hides behind the ridge.
+"""
+
+CAB = CameraPose(position=(0.98, 0.62, 1.45), target=(4.8, -0.05, -0.7), fovy_deg=62.0)
 """Fixed to the house (swing frame, origin on the slewing ring): along the boom down to the dig area."""
 
 

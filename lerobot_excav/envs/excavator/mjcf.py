@@ -70,6 +70,10 @@ def _set_options(spec: mujoco.MjSpec) -> None:
 
 def _add_ground(spec: mujoco.MjSpec) -> None:
     world = spec.worldbody
+    sky = spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+    sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+    sky.rgb1, sky.rgb2 = [0.45, 0.62, 0.82], [0.80, 0.84, 0.86]
+    sky.width, sky.height = 32, 192
     world.add_geom(
         name="ground",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -82,7 +86,7 @@ def _add_ground(spec: mujoco.MjSpec) -> None:
     world.add_geom(
         name="ground_picture",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[16.0, 16.0, 40.0],
+        size=[40.0, 40.0, 40.0],
         pos=[0.0, 0.0, -GROUND_DROP_M],
         group=SURROUNDINGS_GROUP,
         contype=0,

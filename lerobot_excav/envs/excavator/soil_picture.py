@@ -1,0 +1,112 @@
+"""Pictures of the soil: skins that follow its surface, plus the load in the bucket and flying parcels."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.excavator import surfaces
+from lerobot_excav.envs.excavator.machine import ExcavatorMachine
+from lerobot_excav.envs.soil import Soil
+
+_HIDDEN_M = -0.03
+_LEAST_BOX_SOIL_M = 0.005
+_LOAD_THICKNESS_M = 0.10
+_WHITE = np.eye(3).ravel()
+
+
+class SoilPicture:
+    """Keeps the model's soil skins equal to a soil, and draws its moving parts into a scene.
+
+    Args:
+        machine: The machine whose model holds the skins.
+    """
+
+    def __init__(self, machine: ExcavatorMachine) -> None:
+        self._model = machine.model
+        self._machine = machine
+        self._terrain_grid = surfaces.terrain_grid(machine.terrain_shape_m)
+        self._box_grid = surfaces.box_grid(machine.container)
+        self._terrain_shown: NDArray[np.float64] | None = None
+        self._box_shown: NDArray[np.float64] | None = None
+        self._soil_material = self._model.material("soil").id
+
+    def update_skins(self, soil: Soil) -> None:
+        """Move the vertices of the skins to the soil's surface, where it has changed."""
+        heights = soil.heights_m
+        if self._terrain_shown is None or not np.array_equal(heights, self._terrain_shown):
+            self._terrain_shown = heights.copy()
+            surface = soil.height_at(self._terrain_grid)
+            self._write(surfaces.TERRAIN_SKIN, surfaces.skin_vertices(self._terrain_grid, surface))
+        heights = soil.container_heights_m
+        if heights is not None and (self._box_shown is None or not np.array_equal(heights, self._box_shown)):
+            self._box_shown = heights.copy()
+            surface = _resampled(heights, self._box_grid.shape[:2])
+            # Bare floor shows where there is no soil, instead of two surfaces at one height.
+            surface = np.where(surface < _LEAST_BOX_SOIL_M, _HIDDEN_M, surface)
+            self._write(surfaces.BOX_SOIL_SKIN, surfaces.skin_vertices(self._box_grid, surface))
+
+    def add_moving_soil(self, scene: mujoco.MjvScene, soil: Soil) -> None:
+        """Append the load in the bucket and the flying parcels to a scene."""
+        rgba = np.append(self._model.mat_rgba[self._soil_material, :3], 1.0).astype(np.float32)
+        self._add_load(scene, soil, rgba)
+        size = np.full(3, soil.parcel_radius_m)
+        for position in soil.parcel_positions_w[: scene.maxgeom - scene.ngeom]:
+            _add_geom(scene, mujoco.mjtGeom.mjGEOM_SPHERE, size, position, _WHITE, rgba)
+
+    def _add_load(self, scene: mujoco.MjvScene, soil: Soil, rgba: NDArray[np.float32]) -> None:
+        """Append one slab below every piece of the load's free surface, as wide as the bucket."""
+        surface = np.asarray(soil.payload_surface_t)
+        if len(surface) < 2:
+            return
+        tool = self._machine.tool()
+        half_width = 0.5 * tool.geometry.inner_width_m
+        for start, end in zip(surface[:-1], surface[1:], strict=True):
+            length = float(np.hypot(*(end - start)))
+            if length < 1e-6:
+                continue
+            along = np.array([(end - start)[0], 0.0, (end - start)[1]]) / length
+            across = np.array([0.0, 1.0, 0.0])
+            into_load = np.cross(along, across)
+            if into_load[2] < 0.0:  # the shell, and so the load, lies on the +z side of its surface
+                into_load = -into_load
+            middle = 0.5 * (start + end)
+            center_t = np.array([middle[0], 0.0, middle[1]]) + 0.5 * _LOAD_THICKNESS_M * into_load
+            axes_t = np.column_stack([along, np.cross(into_load, along), into_load])
+            _add_geom(
+                scene,
+                mujoco.mjtGeom.mjGEOM_BOX,
+                np.array([0.5 * length, half_width, 0.5 * _LOAD_THICKNESS_M]),
+                tool.position_w + tool.rotation_w @ center_t,
+                (tool.rotation_w @ axes_t).ravel(),
+                rgba,
+            )
+
+    def _write(self, skin: str, vertices: NDArray[np.float32]) -> None:
+        index = self._model.skin(skin).id
+        start = self._model.skin_vertadr[index]
+        self._model.skin_vert[start : start + len(vertices)] = vertices
+
+
+def _resampled(heights: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the nearest cell's height at every vertex of a grid that spans the same rectangle."""
+    rows, columns = (
+        np.minimum((np.linspace(0.0, 1.0, n) * cells).astype(int), cells - 1)
+        for n, cells in zip(shape, heights.shape, strict=True)
+    )
+    return heights[np.ix_(rows, columns)]
+
+
+def _add_geom(
+    scene: mujoco.MjvScene,
+    kind: Any,
+    size: NDArray[np.float64],
+    position_w: NDArray[np.float64],
+    rotation_w: NDArray[np.float64],
+    rgba: NDArray[np.float32],
+) -> None:
+    if scene.ngeom >= scene.maxgeom:
+        return
+    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], kind, size, position_w, rotation_w, rgba)
+    scene.ngeom += 1
