@@ -1,0 +1,199 @@
+"""Recording scripted demonstrations: simulate in parallel, assemble in order, publish at once.
+
+While it is being made, a dataset `OUT` is a folder `OUT.partial` with the settings, the finished episodes and the
+LeRobot dataset that grows from them. The finished dataset is renamed to `OUT`, so `OUT` is complete or absent. Episodes
+are assembled in the order of the settings, so neither the number of workers nor an interruption leaves a trace.
+"""
+
+import shutil
+import time
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from lerobot_excav.datasets.assembly import append_episode, create_dataset
+from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.episode_store import EpisodeStore
+from lerobot_excav.datasets.paired_index import write_index
+from lerobot_excav.datasets.partial_run import PartialRun
+from lerobot_excav.datasets.provenance import read_provenance, write_provenance
+from lerobot_excav.datasets.rig import ExcavatorRig, Rig, play_demonstration
+from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.workers import worker_pool
+from lerobot_excav.errors import DatasetError, ExcavError
+
+Outcome = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemonstrationSummary:
+    """What a run has made.
+
+    Attributes:
+        out: The dataset.
+        episodes: Episodes in the dataset.
+        failures: `pair_uid` of every episode without success.
+        simulated_s: Simulated time of all episodes, kept or not [s].
+        wall_s: Time that this call took [s].
+    """
+
+    out: Path
+    episodes: int
+    failures: list[str]
+    simulated_s: float
+    wall_s: float
+
+
+def record_demonstrations(
+    settings: DemonstrationSettings,
+    out: Path,
+    *,
+    workers: int = 2,
+    resume: bool = False,
+    rig: Rig | None = None,
+    show_progress: bool = True,
+) -> DemonstrationSummary:
+    """Record scripted demonstrations as a LeRobot dataset.
+
+    Args:
+        settings: What to record.
+        out: Folder of the dataset.
+        workers: Worker processes; 0 works in this process.
+        resume: Whether to continue an interrupted run.
+        rig: Environment and operator; the excavator by default.
+        show_progress: Whether to draw a progress bar.
+
+    Returns:
+        Counts, failures and times.
+
+    Raises:
+        DatasetError: `out` exists, an interrupted run is in the way, or no episode is worth keeping.
+        ConfigurationError: A started run has other settings.
+    """
+    start = time.monotonic()
+    if out.exists():
+        outcomes = _require_finished(out, settings, resume=resume)
+    else:
+        with PartialRun(out, settings, resume=resume) as partial:
+            outcomes = _fill(
+                partial, settings, workers=workers, rig=rig or ExcavatorRig(), show_progress=show_progress
+            )
+            partial.dataset.rename(out)
+    PartialRun.remove(out)
+    return DemonstrationSummary(
+        out=out,
+        episodes=sum(outcome["kept"] for outcome in outcomes),
+        failures=[outcome["pair_uid"] for outcome in outcomes if not outcome["success"]],
+        simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.fps,
+        wall_s=time.monotonic() - start,
+    )
+
+
+def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: bool) -> list[Outcome]:
+    if not resume:
+        raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+    provenance = read_provenance(out)
+    settings.require_same(provenance.settings)
+    return provenance.outcomes
+
+
+def _fill(
+    partial: PartialRun, settings: DemonstrationSettings, *, workers: int, rig: Rig, show_progress: bool
+) -> list[Outcome]:
+    """Simulate what is missing and assemble everything in order."""
+    pairs = settings.pairs()
+    dataset = create_dataset(partial.dataset, fps=settings.fps, height=settings.height, width=settings.width)
+    with worker_pool(workers) as pool, _progress_bar(len(pairs), show=show_progress) as bar:
+        futures = {pair: _start(pool, rig, settings, pair, partial.episodes) for pair in pairs}
+        progress = _Progress(bar)
+        for future in futures.values():
+            future.add_done_callback(progress.count)
+        outcomes = []
+        for pair, future in futures.items():
+            outcome = _result(pair, future)
+            if outcome["kept"]:
+                append_episode(dataset, EpisodeStore(partial.episodes).read(pair))
+            outcomes.append(outcome)
+    if not any(outcome["kept"] for outcome in outcomes):
+        raise DatasetError(
+            f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; "
+            "look at them with --keep-failures (the time limit is --episode-length)"
+        )
+    dataset.finalize()
+    shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
+    write_provenance(partial.dataset, settings, outcomes)
+    write_index(partial.dataset)
+    return outcomes
+
+
+def _start(
+    pool: Executor, rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path
+) -> Future[Outcome]:
+    finished = EpisodeStore(folder).outcome(pair)
+    if finished is None:
+        return pool.submit(simulate_episode, rig, settings, pair, folder)
+    future: Future[Outcome] = Future()
+    future.set_result(finished)
+    return future
+
+
+def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
+    """Play one episode and store it; runs in a worker.
+
+    Args:
+        rig: Environment and operator.
+        settings: What is being recorded.
+        pair: Scene and target.
+        folder: Folder of finished episodes.
+
+    Returns:
+        Outcome of the episode.
+    """
+    episode = play_demonstration(rig, settings, pair)
+    return EpisodeStore(folder).write(episode, keep_frames=episode.success or settings.keep_failures)
+
+
+def _result(pair: Pair, future: Future[Outcome]) -> Outcome:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise ExcavError(
+            "a worker process died (out of memory?); continue with --resume, perhaps with fewer --workers"
+        ) from error
+    except ExcavError as error:
+        raise ExcavError(f"{pair.uid}: {error}") from error
+
+
+def _progress_bar(total: int, *, show: bool) -> "tqdm[Any]":
+    return tqdm(
+        total=total,
+        disable=not show,
+        desc="episodes",
+        bar_format="{desc} {n_fmt}/{total_fmt} |{bar}| {elapsed}<{remaining}{postfix}",
+    )
+
+
+class _Progress:
+    """Counts finished episodes on a bar."""
+
+    def __init__(self, bar: "tqdm[Any]") -> None:
+        self._bar = bar
+        self._start = time.monotonic()
+        self._simulated = 0
+        self._failed = 0
+
+    def count(self, future: Future[Outcome]) -> None:
+        """Take in a finished episode."""
+        if future.cancelled() or future.exception() is not None:
+            return
+        minutes = (time.monotonic() - self._start) / 60.0
+        self._simulated += 1
+        self._failed += not future.result()["success"]
+        self._bar.set_postfix_str(
+            f"{self._simulated / max(minutes, 1e-6):.1f} episodes/min, {self._failed} failed", refresh=False
+        )
+        self._bar.update()

@@ -1,0 +1,153 @@
+"""Reading a dataset episode by episode, straight from its columns.
+
+LeRobot's own reader first copies all pictures into a cache; what the index and the checks need is a small part of them.
+"""
+
+import io
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from lerobot.datasets import LeRobotDatasetMetadata
+from PIL import Image
+
+from lerobot_excav.datasets.schema import (
+    ACTION_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    STATE_KEY,
+    SUCCESS_KEY,
+    TARGET_KEY,
+    TASK_STATE_KEY,
+    Pair,
+)
+from lerobot_excav.errors import DatasetError
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeTable:
+    """Columns of one episode of a dataset.
+
+    Attributes:
+        index: Episode index.
+        length: Number of frames.
+        columns: The columns asked for, by key; pictures are undecoded.
+    """
+
+    index: int
+    length: int
+    columns: dict[str, pa.ChunkedArray]
+
+    def array(self, key: str) -> np.ndarray:
+        """Return a numeric column, shape (n, k) or (n,)."""
+        return np.stack(self.columns[key].to_numpy())
+
+    @property
+    def state(self) -> np.ndarray:
+        """Joint positions and velocities, (n, 8)."""
+        return self.array(STATE_KEY)
+
+    @property
+    def action(self) -> np.ndarray:
+        """Joystick commands, (n, 4)."""
+        return self.array(ACTION_KEY)
+
+    @property
+    def task_state(self) -> np.ndarray:
+        """Task state, (n, 8)."""
+        return self.array(TASK_STATE_KEY)
+
+    @property
+    def success(self) -> bool:
+        """Outcome."""
+        return bool(self._constant(SUCCESS_KEY))
+
+    @property
+    def pair(self) -> Pair:
+        """Scene and target.
+
+        Raises:
+            DatasetError: The columns contradict each other.
+        """
+        pair = Pair.parse(self._constant(PAIR_KEY))
+        ids = (self._constant(SCENE_KEY), self._constant(TARGET_KEY))
+        if ids != (pair.scene_id, pair.target_id):
+            raise DatasetError(
+                f"episode {self.index}: scene and target {ids} contradict {PAIR_KEY}={pair.uid!r}"
+            )
+        return pair
+
+    def first_frame(self) -> "EpisodeTable":
+        """Return a copy that holds the first frame only, so that the rest can be forgotten."""
+        first = {
+            key: pa.chunked_array([pa.array(column[:1].to_pylist(), column.type)])
+            for key, column in self.columns.items()
+        }
+        return EpisodeTable(index=self.index, length=1, columns=first)
+
+    def image(self, key: str, frame: int) -> np.ndarray:
+        """Return a decoded picture, (H, W, 3) uint8."""
+        return np.asarray(Image.open(io.BytesIO(self.columns[key][frame]["bytes"].as_py())).convert("RGB"))
+
+    def distinct_images(self, key: str) -> int:
+        """Count pictures that differ in their file bytes; equal pictures of one writer have equal bytes."""
+        return len({value["bytes"].as_py() for value in self.columns[key]})
+
+    def _constant(self, key: str) -> Any:
+        values = pc.unique(self.columns[key]).to_pylist()
+        if len(values) != 1:
+            raise DatasetError(
+                f"episode {self.index}: {key} changes within the episode: {values[:3]}; it names the whole episode"
+            )
+        return values[0]
+
+
+def open_metadata(root: Path) -> LeRobotDatasetMetadata:
+    """Read the metadata of a dataset on disk.
+
+    Raises:
+        DatasetError: There is none.
+    """
+    # Without this check the library would ask the Hub for it.
+    if not (root / "meta" / "info.json").is_file():
+        raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json")
+    return LeRobotDatasetMetadata(repo_id=f"local/{root.name}", root=root)
+
+
+def iterate_episodes(
+    root: Path, keys: Sequence[str], *, episodes: Collection[int] | None = None
+) -> Iterator[EpisodeTable]:
+    """Go through a dataset's episodes in the order of their files.
+
+    Args:
+        root: The dataset.
+        keys: Columns to read.
+        episodes: Episode indices; all by default.
+
+    Yields:
+        One table per episode, frames in order.
+    """
+    metadata = open_metadata(root)
+    wanted = range(metadata.total_episodes) if episodes is None else episodes
+    files = dict.fromkeys(str(metadata.get_data_file_path(index)) for index in sorted(wanted))
+    for file in files:
+        yield from _episodes_of_file(root / file, keys, set(wanted))
+
+
+def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iterator[EpisodeTable]:
+    parquet = pq.ParquetFile(path)
+    columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
+    for group in range(parquet.num_row_groups):
+        # LeRobot writes one row group per episode; a file written by something else just costs more memory.
+        table = parquet.read_row_group(group, columns=columns)
+        for index in pc.unique(table["episode_index"]).to_pylist():
+            if index in wanted:
+                rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
+                yield EpisodeTable(
+                    index=index, length=rows.num_rows, columns={key: rows[key] for key in keys}
+                )

@@ -1,0 +1,83 @@
+"""Quality check of a dataset: schema, values, paired starts and replays; the verdict goes into the index."""
+
+from collections import defaultdict
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from lerobot_excav.datasets.episode_check import MAIN_KEY, episode_problems, scene_problems
+from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, open_metadata
+from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, build_index, store_index
+from lerobot_excav.datasets.replay_check import replay_problem, soil_of
+from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.schema import Pair, require_columns
+from lerobot_excav.errors import require
+
+
+def check_dataset(
+    root: Path,
+    *,
+    episodes: Collection[int] | None = None,
+    replays: int = 3,
+    seed: int = 0,
+    soil: str | None = None,
+    rig: Rig | None = None,
+) -> pd.DataFrame:
+    """Check a dataset and note the verdicts in its index.
+
+    Args:
+        root: The dataset.
+        episodes: Episodes to check; all by default.
+        replays: How many of them to replay, chosen at random.
+        seed: Seed of that choice.
+        soil: Soil of the replays; by default what the dataset says.
+        rig: Makes the environment of the replays; the excavator by default.
+
+    Returns:
+        The checked rows of the index, with `qc` (`passed` or `failed`), `qc_problem` and `replayed`.
+
+    Raises:
+        DatasetError: A column is missing or contradictory, or the soil is unknown.
+        ConfigurationError: An episode that does not exist, or a negative number of replays.
+    """
+    metadata = open_metadata(root)
+    require_columns(metadata.features)
+    wanted = sorted(range(metadata.total_episodes) if episodes is None else set(episodes))
+    unknown = [index for index in wanted if not 0 <= index < metadata.total_episodes]
+    require(
+        not unknown,
+        f"--episodes names {unknown}; the dataset has episodes 0 to {metadata.total_episodes - 1}",
+    )
+    require(replays >= 0, f"--replays={replays} must not be negative")
+
+    index = build_index(root)
+    problems = _static_problems(root, wanted)
+    sound = [number for number in wanted if not problems[number]]
+    sample = np.random.default_rng(seed).permutation(sound)[:replays].tolist()
+    if sample:
+        rig, soil = rig or ExcavatorRig(with_images=False), soil or soil_of(root)
+        for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
+            problem = replay_problem(rig, recorded, fps=metadata.fps, soil=soil)
+            problems[recorded.index] = [problem] if problem else []
+
+    checked = index["episode_index"].isin(wanted)
+    texts = index["episode_index"].map(lambda number: "; ".join(problems.get(number, [])))
+    index.loc[checked, "qc"] = np.where(texts[checked] == "", PASSED, FAILED)
+    index.loc[checked, "qc_problem"] = texts[checked]
+    store_index(root, index)
+    return index[checked].assign(replayed=index["episode_index"].isin(sample))
+
+
+def _static_problems(root: Path, wanted: list[int]) -> dict[int, list[str]]:
+    problems: dict[int, list[str]] = {}
+    scenes: dict[Pair, list[EpisodeTable]] = defaultdict(list)
+    for episode in iterate_episodes(root, (*INDEX_KEYS, MAIN_KEY, "frame_index"), episodes=wanted):
+        problems[episode.index] = episode_problems(episode)
+        if not problems[episode.index]:
+            scenes[episode.pair._replace(target_id=0)].append(episode.first_frame())
+    for scene in scenes.values():
+        for number, problem in scene_problems(scene).items():
+            problems[number].append(problem)
+    return problems

@@ -1,0 +1,72 @@
+"""Replaying recorded actions and comparing what comes out with what was recorded."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.episode import replay
+from lerobot_excav.datasets.episode_table import EpisodeTable
+from lerobot_excav.datasets.provenance import PROVENANCE_PATH, read_provenance
+from lerobot_excav.datasets.resimulation import STATE_TOLERANCE
+from lerobot_excav.datasets.rig import Rig
+from lerobot_excav.datasets.session import SESSION_PATH, read_session
+from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
+from lerobot_excav.errors import DatasetError
+
+TASK_STATE_TOLERANCE = 1e-2
+"""Allowed deviation of a task state, in its own unit (guess; the same build repeats exactly)."""
+
+
+def soil_of(root: Path) -> str:
+    """Return the soil preset that a dataset was made with.
+
+    Raises:
+        DatasetError: The dataset does not say, or names several.
+    """
+    if (root / PROVENANCE_PATH).is_file():
+        return read_provenance(root).settings.soil
+    if (root / SESSION_PATH).is_file():
+        soils = {episode.soil for episode in read_session(root / SESSION_PATH).values()}
+        if len(soils) == 1:
+            return soils.pop()
+        raise DatasetError(
+            f"the recordings of {root} used several soils: {sorted(soils)}; name one with --soil"
+        )
+    raise DatasetError(
+        f"{root} does not say which soil it was made with (merging and editing drop that); give --soil"
+    )
+
+
+def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int, soil: str) -> str:
+    """Play an episode again and describe how it deviates.
+
+    Args:
+        rig: Makes the environment.
+        recorded: The episode with state, action, task state and `excav.*` columns.
+        fps: Frames per second of the dataset.
+        soil: Name of the soil preset.
+
+    Returns:
+        The first deviation beyond tolerance, or an empty string.
+    """
+    pair = recorded.pair
+    settings = DemonstrationSettings(
+        env=pair.env, scene_set=pair.scene_set, fps=fps, soil=soil, episode_length=recorded.length + 1
+    )
+    env = rig.environment(settings)
+    try:
+        played = replay(env, recorded.action, pair)
+    finally:
+        env.close()
+    state = np.abs(played.state - recorded.state).max(axis=1)
+    if state.max() > STATE_TOLERANCE:
+        frame = int(np.argmax(state > STATE_TOLERANCE))
+        return f"replay leaves the recorded state at frame {frame} (up to {state.max():.3g} rad)"
+    task = np.abs(played.task_state - recorded.task_state)
+    if task.max() > TASK_STATE_TOLERANCE:
+        name = TASK_STATE_NAMES[int(np.argmax(task.max(axis=0)))]
+        return f"replay gives another {name} (by up to {task.max():.3g})"
+    if played.success != recorded.success:
+        return f"replay ends with success={played.success}, recorded {recorded.success}"
+    return ""

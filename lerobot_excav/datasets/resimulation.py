@@ -1,0 +1,144 @@
+"""Completing a recording of `lerobot-record` with the columns that only the simulation knows.
+
+The recorder stores pictures, state and action. The actions are played again from the scene that the session log names;
+if the recorded states come out, so do the task state and the outcome of the original.
+"""
+
+import shutil
+import uuid
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lerobot.datasets import LeRobotDataset, add_features
+
+from lerobot_excav.datasets.episode import Episode, replay
+from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, open_metadata
+from lerobot_excav.datasets.paired_index import write_index
+from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.schema import (
+    ACTION_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    STATE_KEY,
+    SUCCESS_KEY,
+    TARGET_KEY,
+    TASK_STATE_KEY,
+    excav_features,
+)
+from lerobot_excav.datasets.session import SESSION_PATH, SessionEpisode, read_session
+from lerobot_excav.errors import DatasetError
+
+STATE_TOLERANCE = 1e-4
+"""Allowed deviation of a state [rad, rad/s]; the same build repeats exactly, another processor may round (guess)."""
+
+
+def complete_recording(
+    root: Path, session_path: Path, *, out: Path | None = None, rig: Rig | None = None
+) -> Path:
+    """Add the `excav.*` columns to a recording, and its index.
+
+    Args:
+        root: The recorded dataset. It stays as it is until everything has succeeded.
+        session_path: Session log of the simulated robot.
+        out: Where to put the completed dataset; it replaces `root` by default.
+        rig: Makes the environment; the excavator by default.
+
+    Returns:
+        Folder of the completed dataset.
+
+    Raises:
+        DatasetError: Columns exist already, the session does not fit, or the re-simulation deviates from the recording.
+    """
+    if out is not None and out.exists():
+        raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+    session = read_session(session_path)
+    _require_completable(root, session)
+    rig = rig or ExcavatorRig(with_images=False)
+    episodes = {
+        recorded.index: _resimulate(rig, recorded, session[recorded.index])
+        for recorded in iterate_episodes(root, (STATE_KEY, ACTION_KEY))
+    }
+    # Beside the destination, so that the last step is a rename.
+    temporary = (out or root).with_name(f".{root.name}.{uuid.uuid4().hex[:8]}")
+    try:
+        _write_completed(root, episodes, temporary)
+        shutil.copyfile(session_path, temporary / SESSION_PATH)
+        write_index(temporary)
+        return _put_in_place(temporary, root, out)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
+    metadata = open_metadata(root)
+    present = [key for key in excav_features() if key in metadata.features]
+    if present:
+        raise DatasetError(
+            f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
+        )
+    missing = [index for index in range(metadata.total_episodes) if index not in session]
+    if missing:
+        raise DatasetError(
+            f"the session has no line for episodes {missing}; is it the session of this recording?"
+        )
+    for index in range(metadata.total_episodes):
+        episode = session[index]
+        if episode.fps != metadata.fps:
+            raise DatasetError(
+                f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {metadata.fps}; "
+                "record with --robot.fps equal to --dataset.fps"
+            )
+        if episode.restarts:
+            raise DatasetError(
+                f"episode {index} was restarted at frame {list(episode.restarts)}, so it is no single demonstration; "
+                "record it again (lerobot-record offers re-recording with the left arrow key, or r)"
+            )
+
+
+def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Episode:
+    env = rig.environment(session.settings())
+    try:
+        played = replay(env, recorded.action, session.pair)
+    finally:
+        env.close()
+    deviation = np.abs(played.state - recorded.state).max(axis=1)
+    if deviation.max() > STATE_TOLERANCE:
+        frame = int(np.argmax(deviation > STATE_TOLERANCE))
+        raise DatasetError(
+            f"episode {recorded.index}: the re-simulation of {session.pair.uid} leaves the recorded state at frame "
+            f"{frame} of {recorded.length} (largest deviation {deviation.max():.3g} rad or rad/s, allowed "
+            f"{STATE_TOLERANCE:g}); is it the session of this recording, and the version that recorded it?"
+        )
+    return played
+
+
+def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> None:
+    """Copy a dataset with the new columns, by LeRobot's own tool."""
+
+    def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
+        return lambda row, episode, frame: values[int(episode)], excav_features()[key]
+
+    def task_state(row: dict[str, Any], episode: int, frame: int) -> np.ndarray:
+        return episodes[int(episode)].task_state[int(frame)]
+
+    features = {
+        SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),
+        TARGET_KEY: constant(TARGET_KEY, {i: e.pair.target_id for i, e in episodes.items()}),
+        PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
+        TASK_STATE_KEY: (task_state, excav_features()[TASK_STATE_KEY]),
+        SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
+    }
+    dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root)
+    add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)
+
+
+def _put_in_place(temporary: Path, root: Path, out: Path | None) -> Path:
+    if out is not None:
+        temporary.rename(out)
+        return out
+    original = temporary.with_name(f"{temporary.name}.original")
+    root.rename(original)
+    temporary.rename(root)
+    shutil.rmtree(original)
+    return root

@@ -1,0 +1,134 @@
+"""What a frame of an excavator dataset holds, and how an episode names its scene and target.
+
+The keys that `lerobot-record` writes from the simulated robot are described exactly as it describes them, so that
+recorded, scripted and rolled-out data merge. The `excav.*` columns are the truth about scene, target and outcome: they
+are ordinary per-frame columns, the only carrier that survives delete, split, merge and push. The scene set is part of
+`excav.pair_uid`.
+"""
+
+from typing import Any, NamedTuple
+
+from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
+from lerobot_excav.errors import DatasetError
+
+ROBOT_TYPE = "excavator_sim"
+JOINTS = ("swing", "boom", "arm", "bucket")
+CAMERAS = ("main", "cab", "target_mask")
+ACTION_NAMES = tuple(f"{joint}.vel" for joint in JOINTS)
+STATE_NAMES = (*(f"{joint}.pos" for joint in JOINTS), *ACTION_NAMES)
+
+STATE_KEY = "observation.state"
+ACTION_KEY = "action"
+MASK_KEY = "observation.images.target_mask"
+SCENE_KEY = "excav.scene_id"
+TARGET_KEY = "excav.target_id"
+PAIR_KEY = "excav.pair_uid"
+TASK_STATE_KEY = "excav.task_state"
+SUCCESS_KEY = "excav.success"
+
+Feature = dict[str, Any]
+
+
+def camera_key(camera: str) -> str:
+    """Return the dataset key of a camera."""
+    return f"observation.images.{camera}"
+
+
+def excav_features() -> dict[str, Feature]:
+    """Describe the columns that LeRobot's recorder does not know."""
+    return {
+        SCENE_KEY: {"dtype": "int64", "shape": (1,), "names": None},
+        TARGET_KEY: {"dtype": "int64", "shape": (1,), "names": None},
+        PAIR_KEY: {"dtype": "string", "shape": (1,), "names": None},
+        TASK_STATE_KEY: {
+            "dtype": "float32",
+            "shape": (len(TASK_STATE_NAMES),),
+            "names": list(TASK_STATE_NAMES),
+        },
+        SUCCESS_KEY: {"dtype": "bool", "shape": (1,), "names": None},
+    }
+
+
+def dataset_features(*, height: int, width: int) -> dict[str, Feature]:
+    """Describe every column of an excavator dataset in LeRobot's terms.
+
+    Args:
+        height: Image height [px].
+        width: Image width [px].
+
+    Returns:
+        Feature descriptions by key. Images are `image` (PNG, lossless), never `video`, whose codec would blur the mask.
+    """
+    features: dict[str, Feature] = {
+        ACTION_KEY: {"dtype": "float32", "shape": (len(ACTION_NAMES),), "names": list(ACTION_NAMES)},
+        STATE_KEY: {"dtype": "float32", "shape": (len(STATE_NAMES),), "names": list(STATE_NAMES)},
+    }
+    for camera in CAMERAS:
+        features[camera_key(camera)] = {
+            "dtype": "image",
+            "shape": (height, width, 3),
+            "names": ["height", "width", "channels"],
+            # The recorder writes this for every camera; merging compares it.
+            "info": {"is_depth_map": False},
+        }
+    return features | excav_features()
+
+
+class Pair(NamedTuple):
+    """One scene shown with one target."""
+
+    env: str
+    scene_set: str
+    scene_id: int
+    target_id: int
+
+    @property
+    def uid(self) -> str:
+        """The `pair_uid`: `env/scene_set/scene_id/target_id`."""
+        return f"{self.env}/{self.scene_set}/{self.scene_id}/{self.target_id}"
+
+    @classmethod
+    def parse(cls, uid: str) -> "Pair":
+        """Read a `pair_uid`.
+
+        Raises:
+            DatasetError: It has another form.
+        """
+        parts = uid.split("/")
+        if len(parts) == 4 and parts[2].isdecimal() and parts[3].isdecimal():
+            return cls(parts[0], parts[1], int(parts[2]), int(parts[3]))
+        raise DatasetError(
+            f"{PAIR_KEY}={uid!r} is not of the form env/scene_set/scene_id/target_id; "
+            "rebuild the column with `lerobot-excav index DATASET --session=FILE`"
+        )
+
+
+def require_columns(features: dict[str, Feature]) -> None:
+    """Check that a dataset has the columns of this schema with the right types.
+
+    Args:
+        features: Feature descriptions of the dataset.
+
+    Raises:
+        DatasetError: A column is missing or is of another type.
+    """
+    expected = dataset_features(height=0, width=0)
+    missing = [key for key in expected if key not in features]
+    if missing:
+        hint = "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`"
+        raise DatasetError(f"the dataset lacks {', '.join(missing)}; {hint}")
+    for key, feature in expected.items():
+        problem = _difference(features[key], feature)
+        if problem:
+            raise DatasetError(f"{key}: {problem}")
+
+
+def _difference(found: Feature, expected: Feature) -> str:
+    if found["dtype"] != expected["dtype"]:
+        hint = " (record with --dataset.video=false)" if found["dtype"] == "video" else ""
+        return f"dtype={found['dtype']!r} instead of {expected['dtype']!r}{hint}"
+    if expected["dtype"] != "image" and tuple(found["shape"]) != expected["shape"]:
+        return f"shape={tuple(found['shape'])} instead of {expected['shape']}"
+    if expected["names"] is not None and list(found["names"] or []) != expected["names"]:
+        return f"names={found['names']} instead of {expected['names']}"
+    return ""

@@ -1,0 +1,101 @@
+"""What the simulated robot noted while `lerobot-record` recorded: which scene and target each episode shows.
+
+The file is JSON Lines, one object per episode; `robots.excavator_sim.session_log` writes it.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.errors import DatasetError
+
+SESSION_PATH = Path("meta/excav_session.jsonl")
+
+_ENDLESS_FRAMES = 2**31 - 1  # the person with the joystick, not the environment, ended the episode
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionEpisode:
+    """One recorded episode.
+
+    Attributes:
+        episode_index: Its number when it was recorded.
+        scene_set: Scene set.
+        scene_id: Scene.
+        target_id: Target.
+        fps: Frames per second.
+        soil: Name of the soil preset.
+        observation_height: Image height [px].
+        observation_width: Image width [px].
+        task: Task of the environment.
+        restarts: Frames after which the scene was restarted within the episode.
+    """
+
+    episode_index: int
+    scene_set: str
+    scene_id: int
+    target_id: int
+    fps: int
+    soil: str
+    observation_height: int
+    observation_width: int
+    task: str
+    restarts: tuple[int, ...] = ()
+
+    @property
+    def pair(self) -> Pair:
+        """Scene and target."""
+        return Pair("excavator", self.scene_set, self.scene_id, self.target_id)
+
+    def settings(self) -> DemonstrationSettings:
+        """Return the settings of an environment that behaves as the robot did."""
+        return DemonstrationSettings(
+            task=self.task,
+            scene_set=self.scene_set,
+            fps=self.fps,
+            height=self.observation_height,
+            width=self.observation_width,
+            soil=self.soil,
+            episode_length=_ENDLESS_FRAMES,
+        )
+
+
+def read_session(path: Path) -> dict[int, SessionEpisode]:
+    """Read a session.
+
+    Args:
+        path: The JSON Lines file.
+
+    Returns:
+        Episodes by index. Of two lines with one index the later counts: the robot repeats a number when an episode
+        was recorded again.
+
+    Raises:
+        DatasetError: The file is missing, or a line is not what it should be.
+    """
+    try:
+        lines = path.read_text().splitlines()
+    except FileNotFoundError:
+        raise DatasetError(
+            f"--session={path} does not exist; the robot wrote it to --robot.session_log"
+        ) from None
+    episodes = [_episode(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
+    return {episode.episode_index: episode for episode in episodes}
+
+
+def _episode(line: str, place: str) -> SessionEpisode:
+    try:
+        record: Mapping[str, Any] = json.loads(line)
+    except json.JSONDecodeError as error:
+        raise DatasetError(f"{place}: not JSON ({error}); the file is damaged") from error
+    values = {field.name: record[field.name] for field in fields(SessionEpisode) if field.name in record}
+    missing = {field.name for field in fields(SessionEpisode)} - {"restarts"} - set(values)
+    if missing:
+        raise DatasetError(
+            f"{place}: lacks {', '.join(sorted(missing))}; is it a session log of excavator_sim?"
+        )
+    return SessionEpisode(**{**values, "restarts": tuple(values.get("restarts", ()))})
