@@ -42,11 +42,6 @@ class SessionLog:
         self._episode: dict[str, Any] | None = None
         self._is_running = False
 
-    @property
-    def is_recording(self) -> bool:
-        """Whether an episode is being recorded now."""
-        return self._is_running
-
     def begin(self, episode_index: int, *, scene_id: int, target_id: int) -> None:
         """Begin an episode; the one before is written unless it had the same number."""
         if self._episode is not None and self._episode["episode_index"] != episode_index:

@@ -1,0 +1,26 @@
+"""What `--robot.type=excavator_sim` accepts."""
+
+import pytest
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("task", "Dance-v0", "'Scoop-v0'"),
+        ("fps", 30, "10, 25, 50"),
+        ("observation_height", 8, "32 to 1024"),
+        ("scene_set", "exam", "'train', 'val', 'test'"),
+        ("scene_id", -1, "from 0"),
+        ("target_id", 4, "0, 1, 2, 3"),
+        ("soil", "lava", "'sand'"),
+        ("advance", "never", "'episode', 'button'"),
+    ],
+)
+def test_an_impossible_value_is_named_with_what_is_allowed(field: str, value: object, allowed: str) -> None:
+    with pytest.raises(ConfigurationError) as raised:
+        ExcavatorSimConfig(**{field: value})
+    assert f"robot.{field}={value!r}" in str(raised.value)
+    assert allowed in str(raised.value)

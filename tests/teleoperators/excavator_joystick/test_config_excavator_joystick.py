@@ -1,0 +1,48 @@
+"""What `--teleop.type=excavator_joystick` accepts."""
+
+from dataclasses import dataclass
+
+import draccus
+import pytest
+from lerobot.teleoperators.config import TeleoperatorConfig
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
+
+AXES = {"left_x": 0, "left_y": 1, "right_x": 3, "right_y": 4}
+
+
+@dataclass
+class Command:
+    teleop: TeleoperatorConfig
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"pattern": "crane"}, "teleop.pattern='crane' is not known; allowed: 'iso', 'sae'"),
+        ({"dead_zone": 1.0}, "teleop.dead_zone=1.0"),
+        ({"dead_zone": -0.1}, "teleop.dead_zone=-0.1"),
+        ({"expo": 2.0}, "teleop.expo=2.0"),
+        ({"invert": ["left"]}, "teleop.invert='left' is not known; allowed: 'left_x'"),
+        ({"device_index": -1}, "teleop.device_index=-1"),
+        ({"reinitialise_button": "select"}, "teleop.reinitialise_button='select' is not known; allowed: 'a'"),
+        ({"next_scene_button": "back"}, "both 'back'; give them two buttons"),
+        ({"joystick_axes": {"left_x": 0}}, "it must number left_x, left_y, right_x, right_y"),
+        ({"joystick_axes": AXES | {"left_x": -1}}, "from 0 on"),
+        ({"joystick_buttons": {"a": 0, "b": 1}}, "it must number back, start"),
+    ],
+)
+def test_an_impossible_value_is_named_with_what_is_allowed(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigurationError) as raised:
+        ExcavatorJoystickConfig(**settings)
+    assert message in str(raised.value)
+
+
+def test_a_joystick_can_be_numbered_on_the_command_line() -> None:
+    flags = ["--teleop.type=excavator_joystick", "--teleop.invert=[left_y]"]
+    flags += ["--teleop.joystick_axes={left_x: 0, left_y: 1, right_x: 3, right_y: 4}"]
+    config = draccus.parse(Command, args=[*flags, "--teleop.joystick_buttons={back: 6, start: 7}"]).teleop
+    assert config.joystick_axes == AXES
+    assert config.joystick_buttons == {"back": 6, "start": 7}
+    assert config.invert == ["left_y"]

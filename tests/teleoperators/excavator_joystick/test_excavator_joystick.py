@@ -1,0 +1,121 @@
+"""The gamepad as LeRobot's commands see it."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lerobot_excav.errors import DeviceError
+from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
+from lerobot_excav.teleoperators.excavator_joystick.excavator_joystick import ExcavatorJoystick
+from lerobot_excav.teleoperators.excavator_joystick.gamepad import lost
+
+STILL = dict.fromkeys(("swing.vel", "boom.vel", "arm.vel", "bucket.vel"), 0.0)
+
+
+class StandInPad:
+    """A gamepad whose sticks and buttons the test moves."""
+
+    name = "Pad"
+
+    def __init__(self) -> None:
+        self.axes = dict.fromkeys(("left_x", "left_y", "right_x", "right_y"), 0.0)
+        self.down: set[str] = set()
+        self.is_lost = self.is_closed = False
+
+    def open(self, **settings: Any) -> "StandInPad":
+        self.settings = settings
+        return self
+
+    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+        if self.is_lost:
+            raise lost(self.name)
+        return self.axes, {button: button in self.down for button in self.settings["buttons"]}
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+@pytest.fixture
+def pad() -> StandInPad:
+    return StandInPad()
+
+
+def joystick_on(pad: StandInPad, calibration_dir: Path, **settings: Any) -> ExcavatorJoystick:
+    config = ExcavatorJoystickConfig(calibration_dir=calibration_dir, **settings)
+    teleop = ExcavatorJoystick(config, open_device=pad.open)
+    teleop.connect()
+    return teleop
+
+
+def test_actions_have_the_robots_names(pad: StandInPad, tmp_path: Path) -> None:
+    teleop = joystick_on(pad, tmp_path)
+    assert teleop.action_features == dict.fromkeys(STILL, float)
+    assert teleop.feedback_features == {}
+    assert list(teleop.get_action()) == list(STILL)
+
+
+def test_sticks_become_commands(pad: StandInPad, tmp_path: Path) -> None:
+    pad.axes |= {"left_x": -1.0, "right_y": -1.0}
+    assert joystick_on(pad, tmp_path).get_action() == STILL | {"swing.vel": 1.0, "boom.vel": -1.0}
+
+
+@pytest.mark.parametrize(
+    ("settings", "command"),
+    [
+        ({}, STILL | {"arm.vel": -0.5}),
+        ({"pattern": "sae"}, STILL | {"boom.vel": 0.5}),
+        ({"invert": ["left_y"]}, STILL | {"arm.vel": 0.5}),
+        ({"expo": 1.0}, STILL | {"arm.vel": -0.125}),
+        ({"dead_zone": 0.6}, STILL),
+    ],
+)
+def test_every_setting_of_the_response_has_an_effect(
+    pad: StandInPad, tmp_path: Path, settings: dict[str, Any], command: dict[str, float]
+) -> None:
+    pad.axes["left_y"] = 0.5
+    teleop = joystick_on(pad, tmp_path, **{"dead_zone": 0.0, **settings})
+    assert teleop.get_action() == pytest.approx(command)
+
+
+def test_a_press_is_told_once(pad: StandInPad, tmp_path: Path) -> None:
+    teleop = joystick_on(pad, tmp_path, reinitialise_button="x", next_scene_button="y")
+    teleop.get_action()
+    pad.down = {"x"}
+    assert teleop.get_action() == STILL | {"reinitialise": 1.0}
+    assert teleop.get_action() == STILL
+    pad.down = {"y"}
+    assert teleop.get_action() == STILL | {"next_scene": 1.0}
+
+
+def test_the_chosen_device_is_opened(pad: StandInPad, tmp_path: Path) -> None:
+    joystick_on(pad, tmp_path, device_index=2, device_name="pad", joystick_buttons={"back": 6, "start": 7})
+    assert pad.settings == {
+        "index": 2,
+        "name": "pad",
+        "buttons": ("back", "start"),
+        "joystick_axes": None,
+        "joystick_buttons": {"back": 6, "start": 7},
+    }
+
+
+def test_a_lost_device_never_repeats_its_last_command(pad: StandInPad, tmp_path: Path) -> None:
+    pad.axes["left_x"] = 1.0
+    teleop = joystick_on(pad, tmp_path)
+    assert teleop.get_action()["swing.vel"] == -1.0
+    pad.is_lost = True
+    for _ in range(2):
+        with pytest.raises(DeviceError, match="is gone"):
+            teleop.get_action()
+
+
+def test_use_out_of_turn_is_refused(pad: StandInPad, tmp_path: Path) -> None:
+    teleop = joystick_on(pad, tmp_path)
+    with pytest.raises(DeviceError, match="connected already"):
+        teleop.connect()
+    teleop.disconnect()
+    assert pad.is_closed
+    assert not teleop.is_connected
+    for use in (teleop.get_action, teleop.disconnect):
+        with pytest.raises(DeviceError, match="not connected"):
+            use()
