@@ -1,0 +1,29 @@
+"""Deformable soil: a height field, a bucket that cuts and spills, parcels in the air, a target box.
+
+Independent of any simulator: poses go in; heights, parcels and wrenches come out.
+
+- `Soil`: the world of soil; `Tool` and `ToolGeometry` describe the bucket, `Reaction` is the answer to it.
+- `Container`: the target box.
+- `SoilParameters`, `PRESETS`, `FIDELITIES`: what the soil is, and how finely it is computed.
+- `relax`: lets a height field avalanche to rest; scenes use it.
+"""
+
+from lerobot_excav.envs.soil.container import Container
+from lerobot_excav.envs.soil.fidelity import FIDELITIES, Fidelity
+from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
+from lerobot_excav.envs.soil.relaxation import relax
+from lerobot_excav.envs.soil.soil import Soil
+from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
+
+__all__ = [
+    "FIDELITIES",
+    "PRESETS",
+    "Container",
+    "Fidelity",
+    "Reaction",
+    "Soil",
+    "SoilParameters",
+    "Tool",
+    "ToolGeometry",
+    "relax",
+]

@@ -1,0 +1,259 @@
+"""The swept bucket in a height field: soil enters through the opening or is pushed aside by the shell.
+
+The inside of the bucket is a convex polytope of half-spaces n . q <= d (`ToolGeometry.planes_t`), so a vertical
+line crosses it in one exact interval at any pose. Soil inside that interval is sampled in vertical bins. The
+motion of a sample relative to the tool tells through which face it came: opening or plate.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.height_field import Grid, in_grid
+from lerobot_excav.envs.soil.relaxation import mark_around
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+Window = tuple[int, int, int, int]
+
+OPENING = 0
+"""Index of the opening among the planes of a tool."""
+
+ALREADY_INSIDE = -1
+
+_LEVEL = 0.3
+"""A face whose outward normal has a smaller horizontal part pushes soil along the motion instead (guess)."""
+
+
+@kernel
+def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Turn a world point into the tool frame."""
+    a, b, c = x - position[0], y - position[1], z - position[2]
+    return (
+        rotation[0, 0] * a + rotation[1, 0] * b + rotation[2, 0] * c,
+        rotation[0, 1] * a + rotation[1, 1] * b + rotation[2, 1] * c,
+        rotation[0, 2] * a + rotation[1, 2] * b + rotation[2, 2] * c,
+    )
+
+
+@kernel
+def column_interval(
+    planes: Array, position: Array, rotation: Array, x: float, y: float
+) -> tuple[float, float, int]:
+    """Return the heights between which a vertical line is inside the bucket, and the face at the upper end.
+
+    The interval is empty (low >= high) if the line misses the bucket.
+    """
+    q = to_tool(position, rotation, x, y, 0.0)
+    low, high, top = -math.inf, math.inf, ALREADY_INSIDE
+    for k in range(len(planes)):
+        rest = planes[k, 3] - planes[k, 0] * q[0] - planes[k, 1] * q[1] - planes[k, 2] * q[2]
+        rate = planes[k, 0] * rotation[2, 0] + planes[k, 1] * rotation[2, 1] + planes[k, 2] * rotation[2, 2]
+        if rate > 1e-12:
+            if rest / rate < high:
+                high, top = rest / rate, k
+        elif rate < -1e-12:
+            low = max(low, rest / rate)
+        elif rest < 0.0:
+            return 0.0, 0.0, top
+    return low, high, top
+
+
+@kernel
+def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[float, float, float]) -> int:
+    """Return the face through which a point came inside, or `ALREADY_INSIDE`; points are in the tool frame."""
+    face, latest = ALREADY_INSIDE, -1.0
+    for k in range(len(planes)):
+        n0, n1, n2, d = planes[k, 0], planes[k, 1], planes[k, 2], planes[k, 3]
+        outside_before = n0 * before[0] + n1 * before[1] + n2 * before[2] - d
+        outside_now = n0 * now[0] + n1 * now[1] + n2 * now[2] - d
+        if outside_before > 0.0:
+            crossing = outside_before / max(outside_before - outside_now, 1e-300)
+            if crossing > latest:
+                face, latest = k, crossing
+    return face
+
+
+@kernel
+def is_covered(
+    heights: Array, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int
+) -> bool:
+    """Tell whether the surface of a column lies inside or above the bucket, or less than a cell below it."""
+    x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
+    low, high, _ = column_interval(planes, position, rotation, x, y)
+    return low < high and heights[i, j] > low - grid[2]
+
+
+@kernel
+def push_aside(
+    heights: Array,
+    active: Mask,
+    grid: Grid,
+    planes: Array,
+    position: Array,
+    rotation: Array,
+    start: tuple[float, float],
+    direction: tuple[float, float],
+    volume: float,
+) -> float:
+    """Put a volume on the first column along a level direction that the bucket does not cover.
+
+    Returns:
+        The volume if that column lies beyond the border, else 0.
+    """
+    x, y = start
+    while True:
+        if not in_grid(heights, grid, x, y):
+            return volume
+        i = int((x - grid[0]) / grid[2] + 0.5)
+        j = int((y - grid[1]) / grid[3] + 0.5)
+        if not is_covered(heights, grid, planes, position, rotation, i, j):
+            heights[i, j] += volume / (grid[2] * grid[3])
+            mark_around(active, i, j)
+            return 0.0
+        x += direction[0] * grid[2]
+        y += direction[1] * grid[3]
+
+
+@kernel
+def _level_unit(rotation: Array, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Turn a tool vector into the world; return its level part as a unit vector and the length of that part."""
+    a = rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2]
+    b = rotation[1, 0] * vector[0] + rotation[1, 1] * vector[1] + rotation[1, 2] * vector[2]
+    length = math.sqrt(a * a + b * b)
+    if length < 1e-12:
+        return 1.0, 0.0, 0.0
+    return a / length, b / length, length
+
+
+@kernel
+def push_direction(
+    planes: Array,
+    rotation: Array,
+    face: int,
+    before: tuple[float, float, float],
+    now: tuple[float, float, float],
+) -> tuple[float, float]:
+    """Return the level unit direction in which soil is pushed aside.
+
+    A plate pushes along its outward normal. Soil that finds no room behind the opening is pushed along the
+    motion of the tool there, and so is soil under a nearly level plate.
+    """
+    if face != OPENING:
+        x, y, length = _level_unit(rotation, (planes[face, 0], planes[face, 1], planes[face, 2]))
+        if length > _LEVEL:
+            return x, y
+    x, y, length = _level_unit(rotation, (before[0] - now[0], before[1] - now[1], before[2] - now[2]))
+    if length > 0.0:
+        return x, y
+    x, y, length = _level_unit(rotation, (planes[face, 0], planes[face, 1], planes[face, 2]))
+    return x, y
+
+
+@kernel
+def cut_column(
+    heights: Array,
+    active: Mask,
+    grid: Grid,
+    planes: Array,
+    pose_before: tuple[Array, Array],
+    pose_now: tuple[Array, Array],
+    i: int,
+    j: int,
+    bins: int,
+    room: float,
+) -> tuple[float, float]:
+    """Clear one column of the soil inside the bucket; return the volumes that entered and that left the grid."""
+    x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
+    low, high, top = column_interval(planes, pose_now[0], pose_now[1], x, y)
+    low, high = max(low, 0.0), min(high, heights[i, j])
+    if high <= low:
+        return 0.0, 0.0
+    share = (high - low) / bins * grid[2] * grid[3]
+    # the column sinks first, so that no pushed soil comes to rest on what is being taken away
+    heights[i, j] = max(0.0, heights[i, j] - (high - low))
+    mark_around(active, i, j)
+    entered, lost = 0.0, 0.0
+    for b in range(bins):
+        z = low + (b + 0.5) * (high - low) / bins
+        before = to_tool(pose_before[0], pose_before[1], x, y, z)
+        now = to_tool(pose_now[0], pose_now[1], x, y, z)
+        face = crossed_face(planes, before, now)
+        if face == ALREADY_INSIDE:
+            face = top  # it fell in from above
+        taken = min(share, room - entered) if face == OPENING else 0.0
+        entered += taken
+        if taken < share:
+            direction = push_direction(planes, pose_now[1], face, before, now)
+            lost += push_aside(
+                heights, active, grid, planes, pose_now[0], pose_now[1], (x, y), direction, share - taken
+            )
+    return entered, lost
+
+
+@kernel
+def cut(
+    heights: Array,
+    active: Mask,
+    grid: Grid,
+    planes: Array,
+    pose_before: tuple[Array, Array],
+    pose_now: tuple[Array, Array],
+    window: Window,
+    bins: int,
+    room: float,
+) -> tuple[float, float]:
+    """Move the bucket through the soil by one sub-step.
+
+    Args:
+        heights: (nx, ny) heights [m], changed in place.
+        active: (nx, ny) avalanche marks, set where heights change.
+        grid: First cell centre and cell sizes.
+        planes: (m, 4) half-spaces of the bucket in its frame.
+        pose_before: Position (3,) and rotation (3, 3) at the start; z above the rigid floor.
+        pose_now: The same at the end.
+        window: Index ranges i0, i1, j0, j1 that hold the bucket at the end.
+        bins: Vertical samples per column.
+        room: Volume that the bucket can still take [m3].
+
+    Returns:
+        Volumes [m3] that entered the bucket and that were pushed over the border.
+    """
+    entered, lost = 0.0, 0.0
+    for i in range(window[0], window[1]):
+        for j in range(window[2], window[3]):
+            if heights[i, j] > 0.0:
+                more = cut_column(
+                    heights, active, grid, planes, pose_before, pose_now, i, j, bins, room - entered
+                )
+                entered += more[0]
+                lost += more[1]
+    return entered, lost
+
+
+@kernel
+def freeze_covered(
+    heights: Array,
+    active: Mask,
+    frozen: Mask,
+    grid: Grid,
+    planes: Array,
+    position: Array,
+    rotation: Array,
+    window: Window,
+) -> int:
+    """Freeze the columns of a window that the bucket covers, free the others; return how many are frozen.
+
+    The plates thereby hold back avalanches that the height field alone would let through them.
+    """
+    count = 0
+    for i in range(window[0], window[1]):
+        for j in range(window[2], window[3]):
+            covered = is_covered(heights, grid, planes, position, rotation, i, j)
+            if frozen[i, j] and not covered:
+                mark_around(active, i, j)
+            frozen[i, j] = 1 if covered else 0
+            count += 1 if covered else 0
+    return count

@@ -1,0 +1,89 @@
+"""Fundamental equation of earthmoving: resistance of a soil wedge before a flat blade.
+
+Reece 1965, McKyes 1985, for rake a (blade from the horizontal), failure angle b, friction phi and soil-steel
+friction delta:
+
+    D  = cos(a + delta) + sin(a + delta) cot(b + phi)
+    Ng = (cot a + cot b) / (2 D)          weight
+    Nc = (1 + cot b cot(b + phi)) / D     cohesion
+    Nq = 2 Ng                             surcharge
+    Na = (tan b + cot(b + phi)) / (D (1 + tan b cot a))   inertia
+
+    P = (gamma d^2 Ng + c d Nc + q d Nq + rho v^2 d Na) w
+
+The failure angle is the one with the least Ng. For a wedge of weight W the weight term is
+P = W sin(b + phi) / sin(a + delta + b + phi), which holds on any surface.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RAKE_MIN_RAD = math.radians(20.0)
+RAKE_MAX_RAD = math.radians(75.0)
+"""Range of the rake. Above, planar wedges over-predict, since a dead wedge forms on the blade (Miedema, ch. 11)."""
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EarthmovingFactors:
+    """Dimensionless factors of the fundamental equation of earthmoving."""
+
+    weight: float
+    cohesion: float
+    surcharge: float
+    inertia: float
+
+
+def _cot(angle: float) -> float:
+    return math.cos(angle) / math.sin(angle)
+
+
+def earthmoving_factors(
+    rake_rad: float, failure_rad: float, friction_rad: float, steel_rad: float
+) -> EarthmovingFactors:
+    """Return the factors for a blade and a failure plane; formulas at the head of this module."""
+    turned = _cot(failure_rad + friction_rad)
+    divisor = math.cos(rake_rad + steel_rad) + math.sin(rake_rad + steel_rad) * turned
+    weight = (_cot(rake_rad) + _cot(failure_rad)) / (2.0 * divisor)
+    return EarthmovingFactors(
+        weight=weight,
+        cohesion=(1.0 + _cot(failure_rad) * turned) / divisor,
+        surcharge=2.0 * weight,
+        inertia=(math.tan(failure_rad) + turned) / (divisor * (1.0 + math.tan(failure_rad) * _cot(rake_rad))),
+    )
+
+
+def failure_angle(rake_rad: float, friction_rad: float, steel_rad: float) -> float:
+    """Return the failure angle [rad] with the least weight factor, by golden-section search.
+
+    The search covers the angles at which the wedge can be in balance: b + a + delta + phi below pi.
+    """
+    low = math.radians(1.0)
+    high = min(math.radians(85.0), math.pi - rake_rad - steel_rad - friction_rad - math.radians(0.5))
+
+    def weight(angle: float) -> float:
+        return earthmoving_factors(rake_rad, angle, friction_rad, steel_rad).weight
+
+    for _ in range(60):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        if weight(left) < weight(right):
+            high = right
+        else:
+            low = left
+    return 0.5 * (low + high)
+
+
+def failure_table(friction_rad: float, steel_rad: float) -> Array:
+    """Return (n, 3) rows of rake [rad], failure angle [rad] and cohesion factor, by 1 degree of rake."""
+    count = round(math.degrees(RAKE_MAX_RAD - RAKE_MIN_RAD)) + 1
+    rows = []
+    for rake in np.linspace(RAKE_MIN_RAD, RAKE_MAX_RAD, count):
+        angle = failure_angle(rake, friction_rad, steel_rad)
+        rows.append((rake, angle, earthmoving_factors(rake, angle, friction_rad, steel_rad).cohesion))
+    return np.array(rows)

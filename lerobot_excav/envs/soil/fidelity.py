@@ -1,0 +1,28 @@
+"""Levels of numerical effort."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fidelity:
+    """Numerical effort of one soil step.
+
+    Attributes:
+        vertical_bins: Samples along the height of a column inside the bucket.
+        substep_cells: Largest motion of the tool per sub-step, in cells.
+        sweeps_per_tick: Avalanche sweeps per step; more let slopes come to rest sooner.
+        force_slices: Lateral slices of the cutting edge in the force model.
+    """
+
+    vertical_bins: int
+    substep_cells: float
+    sweeps_per_tick: int
+    force_slices: int
+
+
+FIDELITIES = {
+    "fast": Fidelity(vertical_bins=2, substep_cells=1.0, sweeps_per_tick=4, force_slices=4),
+    "standard": Fidelity(vertical_bins=4, substep_cells=0.5, sweeps_per_tick=8, force_slices=8),
+    "fine": Fidelity(vertical_bins=8, substep_cells=0.25, sweeps_per_tick=16, force_slices=12),
+}
+"""Known levels by name; all keep the same ledger and are deterministic."""

@@ -1,0 +1,116 @@
+"""Soil presets: bulk properties with the unit, source and kind of every number."""
+
+import math
+from dataclasses import dataclass
+
+from lerobot_excav.errors import require
+
+GRAVITY_M_S2 = 9.81
+"""Standard gravity, rounded as the references round it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Where a number comes from: its unit, its source and its kind (paper, datasheet, derived, tuned, guess)."""
+
+    unit: str
+    source: str
+    kind: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoilParameters:
+    """Bulk properties of one soil; `PROVENANCE` has the source of each.
+
+    Attributes:
+        density_kg_m3: Bulk density, on the ground as in the air.
+        friction_angle_rad: Internal friction; the repose angle is the same number, as in AGX Terrain.
+        cohesion_pa: Cohesion; enters the digging force only.
+        swell: Volume of loosened soil in the bucket over its volume in the ground.
+        steel_friction_angle_rad: Friction between soil and plate.
+        parcel_radius_m: Radius of one falling parcel.
+        parcel_solid_fraction: Share of a bulk volume that the spheres of its parcels fill.
+        penetration_scale: Factor on the bearing resistance of the cutting edge.
+        spill_time_s: Time constant of the flow over the spilling edge.
+    """
+
+    density_kg_m3: float
+    friction_angle_rad: float
+    cohesion_pa: float
+    swell: float
+    steel_friction_angle_rad: float
+    parcel_radius_m: float = 0.045
+    parcel_solid_fraction: float = 0.60
+    penetration_scale: float = 1.0
+    spill_time_s: float = 0.25
+
+    def __post_init__(self) -> None:
+        for name, low, high in _ALLOWED:
+            value = getattr(self, name)
+            require(
+                math.isfinite(value) and low <= value <= high,
+                f"soil {name}={value!r} is out of range; allowed: {low} to {high}.",
+            )
+
+    @property
+    def slope_tan(self) -> float:
+        """Tangent of the repose angle."""
+        return math.tan(self.friction_angle_rad)
+
+    @property
+    def parcel_mass_kg(self) -> float:
+        """Mass of one parcel: its sphere carries the voids around it, so that a heap has the bulk density."""
+        sphere_m3 = 4.0 / 3.0 * math.pi * self.parcel_radius_m**3
+        return self.density_kg_m3 * sphere_m3 / self.parcel_solid_fraction
+
+
+_ALLOWED = (
+    ("density_kg_m3", 100.0, 5000.0),
+    ("friction_angle_rad", 0.05, 1.2),
+    ("cohesion_pa", 0.0, 1e5),
+    ("swell", 1.0, 2.0),
+    ("steel_friction_angle_rad", 0.0, 1.2),
+    ("parcel_radius_m", 1e-3, 0.5),
+    ("parcel_solid_fraction", 0.3, 1.0),
+    ("penetration_scale", 0.0, 100.0),
+    ("spill_time_s", 1e-3, 10.0),
+)
+
+_AGX = "Algoryx AGX Terrain material presets (AGXUnreal assets, Apache-2.0), values re-typed"
+
+PROVENANCE = {
+    "density_kg_m3": Provenance(unit="kg/m3", source=_AGX, kind="paper"),
+    "friction_angle_rad": Provenance(unit="rad", source=_AGX, kind="paper"),
+    "cohesion_pa": Provenance(unit="Pa", source=_AGX, kind="paper"),
+    "swell": Provenance(unit="1", source=_AGX, kind="paper"),
+    "steel_friction_angle_rad": Provenance(
+        unit="rad", source="2/3 of the friction angle, McKyes 1985", kind="derived"
+    ),
+    "parcel_radius_m": Provenance(unit="m", source="about one cell of 5 cm", kind="guess"),
+    "parcel_solid_fraction": Provenance(
+        unit="1", source="random packing of spheres, 0.60 to 0.64", kind="paper"
+    ),
+    "penetration_scale": Provenance(unit="1", source="bearing theory as it is", kind="guess"),
+    "spill_time_s": Provenance(unit="s", source="a full dump takes about 1 s", kind="guess"),
+}
+"""Source of each field of `SoilParameters`."""
+
+
+def _preset(density: float, friction_deg: float, cohesion: float, swell: float) -> SoilParameters:
+    friction = math.radians(friction_deg)
+    return SoilParameters(
+        density_kg_m3=density,
+        friction_angle_rad=friction,
+        cohesion_pa=cohesion,
+        swell=swell,
+        steel_friction_angle_rad=2.0 / 3.0 * friction,
+    )
+
+
+PRESETS = {
+    "sand": _preset(1474.0, 39.001, 0.0, 1.0),
+    "gravel": _preset(1474.0, 43.997, 0.0, 1.0),
+    "dirt": _preset(1474.0, 39.981, 2100.0, 1.1),
+    "wet_sand": _preset(1474.0, 33.002, 5000.0, 1.12),
+}
+"""Known soils by name."""
