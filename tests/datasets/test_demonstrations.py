@@ -131,9 +131,11 @@ def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(
 
 
 def test_two_runs_cannot_write_the_same_dataset(tmp_path, record_toy, toy_settings):
-    with PartialRun(tmp_path / "d", toy_settings(), resume=False):
-        with pytest.raises(DatasetError, match="another process"):
-            record_toy(tmp_path / "d", resume=True)
+    with (
+        PartialRun(tmp_path / "d", toy_settings(), resume=False),
+        pytest.raises(DatasetError, match="another process"),
+    ):
+        record_toy(tmp_path / "d", resume=True)
 
 
 def test_every_episode_has_its_own_seed_whatever_is_recorded_with_it(tmp_path, paired_dataset, record_toy):

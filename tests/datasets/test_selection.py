@@ -1,0 +1,105 @@
+from collections import Counter
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
+from lerobot_excav.errors import ConfigurationError, DatasetError
+
+
+def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
+    """Make the columns of an index that selecting needs."""
+    rows = [
+        {
+            "episode_index": number,
+            "pair_uid": f"excavator/train/{scene}/{target}",
+            "env": "excavator",
+            "scene_set": "train",
+            "scene_id": scene,
+            "target_id": target,
+            "success": True,
+            "qc": "unchecked",
+        }
+        for number, (scene, target) in enumerate(pairs)
+    ]
+    return pd.DataFrame(rows).assign(**columns)
+
+
+pair_sets = st.sets(st.tuples(st.integers(0, 12), st.integers(0, 3)), min_size=1).map(sorted)
+
+
+@given(pairs=pair_sets, composition=st.sampled_from(COMPOSITIONS), seed=st.integers(0, 5))
+def test_a_selection_has_the_composition_it_names(pairs, composition, seed):
+    index = index_of(pairs)
+    chosen = select(index, composition, seed=seed)
+    assert set(chosen["episode_index"]) <= set(index["episode_index"])
+    assert chosen["episode_index"].is_monotonic_increasing
+    assert chosen["episode_index"].is_unique
+    per_scene = Counter(chosen["scene_id"])
+    per_target = Counter(chosen["target_id"])
+    targets = index["target_id"].nunique()
+    if composition == "paired":
+        assert set(per_scene.values()) <= {targets}
+    if composition == "non-paired":
+        assert set(per_scene) == set(index["scene_id"])
+        assert set(per_scene.values()) == {1}
+    if composition == "balanced":
+        assert set(per_target.values()) == {Counter(index["target_id"]).most_common()[-1][1]}
+
+
+@given(scenes=st.integers(1, 12), wanted=st.integers(1, 12), seed=st.integers(0, 5))
+def test_non_paired_targets_are_equally_frequent_where_all_scenes_have_all(scenes, wanted, seed):
+    index = index_of([(s, t) for s in range(scenes) for t in range(4)])
+    if wanted > scenes:
+        with pytest.raises(DatasetError, match=f"only {scenes} are there"):
+            select(index, "non-paired", scenes=wanted, seed=seed)
+        return
+    frequency = Counter(select(index, "non-paired", scenes=wanted, seed=seed)["target_id"])
+    assert max(frequency.values()) - min(frequency[t] for t in range(4)) <= 1
+
+
+@given(few=st.integers(1, 6), more=st.integers(0, 6), seed=st.integers(0, 5))
+def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    small = select(index, "paired", scenes=few, seed=seed)["episode_index"]
+    large = select(index, "paired", episodes=4 * (few + more), seed=seed)["episode_index"]
+    assert set(small) <= set(large)
+    assert len(small) == 4 * few
+
+
+def test_the_seed_changes_the_choice():
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    choices = {tuple(select(index, "paired", scenes=3, seed=seed)["scene_id"]) for seed in range(8)}
+    assert len(choices) > 1
+
+
+def test_failures_rejected_episodes_and_repetitions_are_not_usable():
+    index = index_of([(0, 0), (0, 1), (0, 2), (0, 2)])
+    index.loc[0, "success"] = False
+    index.loc[1, "qc"] = "failed"
+    assert usable(index)["episode_index"].tolist() == [2]
+    assert usable(index, include_failures=True)["episode_index"].tolist() == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"composition": "odd"}, "--select|select="),
+        ({"composition": "paired", "episodes": 6}, "no multiple of the 4 targets"),
+        ({"composition": "paired", "episodes": 4, "scenes": 1}, "exclude each other"),
+        ({"composition": "balanced", "scenes": 1}, "--scenes has no meaning"),
+        ({"composition": "balanced", "episodes": 3}, "cannot be balanced"),
+        ({"composition": "all", "episodes": 0}, "at least 1"),
+    ],
+)
+def test_contradictory_arguments_are_named(arguments, message):
+    index = index_of([(s, t) for s in range(3) for t in range(4)])
+    with pytest.raises(ConfigurationError, match=message):
+        select(index, **arguments)
+
+
+def test_an_empty_index_is_refused():
+    with pytest.raises(DatasetError, match="no usable episode"):
+        select(usable(index_of([(0, 0)], success=False)), "all")
