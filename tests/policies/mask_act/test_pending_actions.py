@@ -1,0 +1,85 @@
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lerobot.policies.act.modeling_act import ACTTemporalEnsembler
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsemble
+
+
+def masks(*values):
+    return torch.tensor(values, dtype=torch.float32).reshape(-1, 1, 1, 1).expand(-1, 1, 4, 6).clone()
+
+
+def test_first_masks_are_new_and_equal_masks_are_not():
+    watch = TargetWatch()
+    assert watch.changed(masks(0, 1)).tolist() == [True, True]
+    assert watch.changed(masks(0, 1)).tolist() == [False, False]
+    watch.reset()
+    assert watch.changed(masks(0, 1)).tolist() == [True, True]
+
+
+def test_one_pixel_makes_a_new_mask():
+    watch, mask = TargetWatch(), masks(0, 0)
+    watch.changed(mask)
+    moved = mask.clone()
+    moved[1, 0, 3, 5] = 1
+    assert watch.changed(moved).tolist() == [False, True]
+
+
+def test_a_batch_of_another_size_needs_a_reset():
+    watch = TargetWatch()
+    watch.changed(masks(0, 1))
+    with pytest.raises(ConfigurationError, match=r"policy.reset\(\)"):
+        watch.changed(masks(0, 1, 1))
+
+
+def test_an_empty_queue_says_so():
+    with pytest.raises(ConfigurationError, match="empty"):
+        ActionQueue(4).pop()
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    n_action_steps=st.integers(1, 4),
+    changes=st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=1, max_size=12),
+)
+def test_queue_equals_one_list_per_environment(n_action_steps, changes):
+    queue, lists = ActionQueue(n_action_steps), [[], [], []]
+    for step, change in enumerate(changes):
+        changed = torch.tensor(change) if step else torch.ones(3, dtype=torch.bool)
+        stale = queue.stale(changed)
+        # The plan made at this step for environment e is 100 step + 10 e + position in the plan.
+        plans = 100 * step + 10 * torch.arange(3)[:, None] + torch.arange(4)
+        for e in range(3):
+            if changed[e] or not lists[e]:
+                lists[e] = plans[e, :n_action_steps].tolist()
+        if stale.any():
+            queue.put(stale, plans[stale][..., None].float())
+        assert queue.pop()[:, 0].tolist() == [lists[e].pop(0) for e in range(3)]
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.01, -0.1, 1.0])
+def test_without_changes_the_ensemble_is_lerobots(coefficient):
+    ours, theirs = TemporalEnsemble(coefficient, 6), ACTTemporalEnsembler(coefficient, 6)
+    generator = torch.Generator().manual_seed(0)
+    for step in range(15):
+        chunk = torch.randn(2, 6, 3, generator=generator)
+        action = ours.update(chunk, torch.full((2,), step == 0))
+        torch.testing.assert_close(action, theirs.update(chunk), rtol=1e-5, atol=1e-6)
+
+
+def test_a_change_restarts_the_ensemble_of_its_environment_alone():
+    generator = torch.Generator().manual_seed(0)
+    chunks = torch.randn(8, 3, 6, 2, generator=generator)
+    mixed, undisturbed, late = (TemporalEnsemble(0.1, 6) for _ in range(3))
+    for step in range(8):
+        changed = torch.tensor([step == 0, step in (0, 5), step == 0])
+        action = mixed.update(chunks[step], changed)
+        expected = undisturbed.update(chunks[step], torch.full((3,), step == 0))
+        assert torch.equal(action[[0, 2]], expected[[0, 2]])
+        if step >= 5:
+            fresh = late.update(chunks[step], torch.full((3,), step == 5))
+            assert torch.equal(action[1], fresh[1])
+            assert not torch.equal(action[1], expected[1])

@@ -1,0 +1,120 @@
+import pytest
+import torch
+
+from lerobot_excav.errors import ConfigurationError
+
+MAIN, MASK = "observation.images.main", "observation.images.target_mask"
+
+
+@pytest.fixture
+def counted(awake, monkeypatch):
+    """A policy that writes down how many environments each plan was made for."""
+
+    def build(**settings):
+        agent = awake(**settings)
+        plan, sizes = agent.predict_action_chunk, []
+
+        def counting(batch, **kwargs):
+            sizes.append(batch[MAIN].shape[0])
+            return plan(batch, **kwargs)
+
+        monkeypatch.setattr(agent, "predict_action_chunk", counting)
+        return agent, sizes
+
+    return build
+
+
+def test_a_plan_is_executed_in_order_and_made_once(counted, batch):
+    agent, sizes = counted()
+    observation = batch()
+    plan = agent.predict_action_chunk(observation)
+    actions = torch.stack([agent.select_action(observation) for _ in range(8)], dim=1)
+    torch.testing.assert_close(actions, plan, rtol=0, atol=0)
+    assert sizes == [3, 3]
+
+
+def test_n_action_steps_decides_when_the_next_plan_is_made(counted, batch):
+    agent, sizes = counted(n_action_steps=2)
+    for seed in range(6):
+        agent.select_action(batch(seed=seed))
+    assert sizes == [3, 3, 3]
+
+
+def test_a_new_mask_drops_only_the_plan_of_its_environment(counted, batch, mask):
+    agent, sizes = counted()
+    first, second = batch(seed=1), batch(seed=2)
+    old_plan = agent.predict_action_chunk(first)
+    for _ in range(3):
+        agent.select_action(first)
+    second[MASK][1] = mask(1, top=0, left=0)[0]
+    new_plan = agent.predict_action_chunk(second)
+    sizes.clear()
+    actions = torch.stack([agent.select_action(second) for _ in range(5)], dim=1)
+    torch.testing.assert_close(actions[[0, 2]], old_plan[[0, 2], 3:8], rtol=0, atol=0)
+    torch.testing.assert_close(actions[1], new_plan[1, :5], rtol=1e-5, atol=1e-5)
+    assert sizes == [1]
+    assert (new_plan[1] - old_plan[1]).abs().max() > 1e-3
+    # The two old plans run out now, the new one has three actions left.
+    agent.select_action(second)
+    assert sizes == [1, 2]
+
+
+def test_a_new_mask_restarts_only_the_ensemble_of_its_environment(awake, batch, mask):
+    changed, steady = (awake(temporal_ensemble_coeff=0.01) for _ in range(2))
+    for seed in range(3):
+        changed.select_action(batch(seed=seed))
+        steady.select_action(batch(seed=seed))
+    observation, same = batch(seed=3), batch(seed=3)
+    observation[MASK][1] = mask(1, top=0, left=0)[0]
+    action = changed.select_action(observation)
+    expected = steady.select_action(same)
+    torch.testing.assert_close(action[[0, 2]], expected[[0, 2]])
+    torch.testing.assert_close(action[1], changed.predict_action_chunk(observation)[1, 0])
+    assert not torch.allclose(action[1], expected[1], atol=1e-4)
+
+
+def test_a_withheld_mask_changes_no_plan(counted, batch, mask):
+    agent, sizes = counted(withhold_mask=True)
+    observation = batch()
+    agent.select_action(observation)
+    observation[MASK] = mask(3, top=0, left=0)
+    agent.select_action(observation)
+    assert sizes == [3]
+
+
+def test_reset_forgets_plans_and_admits_another_batch_size(awake, batch):
+    agent = awake()
+    agent.select_action(batch(3))
+    with pytest.raises(ConfigurationError, match="reset"):
+        agent.select_action(batch(2))
+    agent.reset()
+    observation = batch(2, seed=7)
+    torch.testing.assert_close(
+        agent.select_action(observation), agent.predict_action_chunk(observation)[:, 0]
+    )
+
+
+def test_reset_forgets_the_ensemble(awake, batch):
+    agent = awake(temporal_ensemble_coeff=0.01)
+    agent.select_action(batch(3))
+    agent.reset()
+    observation = batch(2, seed=7)
+    torch.testing.assert_close(
+        agent.select_action(observation), agent.predict_action_chunk(observation)[:, 0]
+    )
+
+
+def test_a_plan_may_start_in_inference_mode_and_go_on_outside(awake, batch, mask):
+    agent = awake()
+    observation = batch()
+    with torch.inference_mode():
+        agent.select_action(observation)
+    other = {**observation, MASK: mask(3, top=0, left=0)}
+    assert torch.isfinite(agent.select_action(other)).all()
+
+
+def test_selecting_an_action_leaves_the_observation_alone(awake, batch):
+    agent, observation, copy = awake(), batch(), batch()
+    agent.select_action(observation)
+    assert observation.keys() == copy.keys()
+    assert all(torch.equal(observation[key], copy[key]) for key in copy)
