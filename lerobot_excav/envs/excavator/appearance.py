@@ -21,11 +21,11 @@ class Appearance:
     """
 
     soil_rgb: Rgb = (0.76, 0.60, 0.38)
-    machine_rgb: Rgb = (0.96, 0.70, 0.08)
-    ground_rgb: Rgb = (0.47, 0.50, 0.42)
+    machine_rgb: Rgb = (0.93, 0.64, 0.06)
+    ground_rgb: Rgb = (0.46, 0.49, 0.42)
     box_rgb: Rgb = (0.20, 0.38, 0.58)
     light_dir_w: tuple[float, float, float] = (0.55, 0.45, -0.70)
-    light_intensity: float = 0.8
+    light_intensity: float = 0.7
 
 
 def draw_appearance(rng: np.random.Generator) -> Appearance:
@@ -49,7 +49,7 @@ def draw_appearance(rng: np.random.Generator) -> Appearance:
         ground_rgb=_near(rng, default.ground_rgb, 0.08),
         box_rgb=_near(rng, default.box_rgb, 0.08),
         light_dir_w=light_dir_w,
-        light_intensity=float(rng.uniform(0.65, 0.95)),
+        light_intensity=float(rng.uniform(0.55, 0.8)),
     )
 
 

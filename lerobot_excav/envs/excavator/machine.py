@@ -126,7 +126,7 @@ class ExcavatorMachine:
         direction = np.array(appearance.light_dir_w)
         model.light_dir[sun] = direction / np.linalg.norm(direction)
         model.light_diffuse[sun] = appearance.light_intensity
-        model.light_specular[sun] = 0.3 * appearance.light_intensity
+        model.light_specular[sun] = 0.2 * appearance.light_intensity
         mujoco.mj_camlight(model, self.data)
 
     @property

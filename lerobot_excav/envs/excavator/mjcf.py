@@ -63,8 +63,8 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     spec.visual.map.zfar = 12.0
     spec.stat.extent = 5.0
     spec.stat.center = [-1.0, 1.0, 0.5]
-    spec.visual.headlight.ambient = [0.36, 0.37, 0.40]
-    spec.visual.headlight.diffuse = [0.12, 0.12, 0.12]
+    spec.visual.headlight.ambient = [0.34, 0.35, 0.37]
+    spec.visual.headlight.diffuse = [0.10, 0.10, 0.10]
     spec.visual.headlight.specular = [0.0, 0.0, 0.0]
 
 

@@ -1,5 +1,6 @@
 """Pictures of the soil: skins that follow its surface, plus the load in the bucket and flying parcels."""
 
+from itertools import pairwise
 from typing import Any
 
 import mujoco
@@ -12,7 +13,8 @@ from lerobot_excav.envs.soil import Soil
 
 _HIDDEN_M = -0.03
 _LEAST_BOX_SOIL_M = 0.005
-_LOAD_THICKNESS_M = 0.10
+_LOAD_SKIN_M = 0.03
+_STRAIGHT_RAD = 0.1
 _WHITE = np.eye(3).ravel()
 
 
@@ -56,28 +58,25 @@ class SoilPicture:
             _add_geom(scene, mujoco.mjtGeom.mjGEOM_SPHERE, size, position, _WHITE, rgba)
 
     def _add_load(self, scene: mujoco.MjvScene, soil: Soil, rgba: NDArray[np.float32]) -> None:
-        """Append one slab below every piece of the load's free surface, as wide as the bucket."""
-        surface = np.asarray(soil.payload_surface_t)
-        if len(surface) < 2:
-            return
+        """Append one slab below every straight piece of the load's free surface, as wide as the bucket."""
+        surface = _corners(np.asarray(soil.payload_surface_t))
         tool = self._machine.tool()
         half_width = 0.5 * tool.geometry.inner_width_m
-        for start, end in zip(surface[:-1], surface[1:], strict=True):
+        for start, end in pairwise(surface):
+            middle = 0.5 * (start + end)
+            # A heap stands out of the opening (z < 0): there the slab reaches down to it and shows the heap's side.
+            half_thickness = 0.5 * (_LOAD_SKIN_M + max(0.0, -middle[1]))
             length = float(np.hypot(*(end - start)))
-            if length < 1e-6:
-                continue
-            along = np.array([(end - start)[0], 0.0, (end - start)[1]]) / length
-            across = np.array([0.0, 1.0, 0.0])
-            into_load = np.cross(along, across)
+            along = np.array([end[0] - start[0], 0.0, end[1] - start[1]]) / length
+            into_load = np.array([-along[2], 0.0, along[0]])
             if into_load[2] < 0.0:  # the shell, and so the load, lies on the +z side of its surface
                 into_load = -into_load
-            middle = 0.5 * (start + end)
-            center_t = np.array([middle[0], 0.0, middle[1]]) + 0.5 * _LOAD_THICKNESS_M * into_load
+            center_t = np.array([middle[0], 0.0, middle[1]]) + half_thickness * into_load
             axes_t = np.column_stack([along, np.cross(into_load, along), into_load])
             _add_geom(
                 scene,
                 mujoco.mjtGeom.mjGEOM_BOX,
-                np.array([0.5 * length, half_width, 0.5 * _LOAD_THICKNESS_M]),
+                np.array([0.5 * length, half_width, half_thickness]),
                 tool.position_w + tool.rotation_w @ center_t,
                 (tool.rotation_w @ axes_t).ravel(),
                 rgba,
@@ -87,6 +86,21 @@ class SoilPicture:
         index = self._model.skin(skin).id
         start = self._model.skin_vertadr[index]
         self._model.skin_vert[start : start + len(vertices)] = vertices
+
+
+def _corners(polyline: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the ends of a polyline's straight pieces: points at which its direction has turned."""
+    if len(polyline) < 2:
+        return polyline[:0]
+    steps = np.diff(polyline, axis=0)
+    angles = np.arctan2(steps[:, 1], steps[:, 0])
+    kept, reference = [0], angles[0]
+    for i, angle in enumerate(angles):
+        if abs(np.angle(np.exp(1j * (angle - reference)))) > _STRAIGHT_RAD:
+            kept.append(i)
+            reference = angle
+    kept.append(len(polyline) - 1)
+    return polyline[kept]
 
 
 def _resampled(heights: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
