@@ -6,16 +6,20 @@ milliradians and a drift rate of zero. The reference never leads the joint by mo
 the servo saturates: like a relief valve, a stalled joint stays stalled without winding up.
 """
 
+from collections.abc import Sequence
+from math import sqrt
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lerobot_excav.envs.excavator import constants as const
 from lerobot_excav.errors import ConfigurationError
 
-_LOWER, _UPPER = np.array(const.JOINT_RANGE_RAD).T
-_SPEED = np.array(const.JOINT_SPEED_RAD_S)
-_ACCEL = np.array(const.JOINT_ACCEL_RAD_S2)
-_VELOCITY_LEAD_S = np.array(const.SERVO_DAMPING_NMS_RAD) / np.array(const.SERVO_STIFFNESS_NM_RAD)
+# Position offset at which the stiffness balances the damping of a joint that moves at 1 rad/s.
+_VELOCITY_LEAD_S = tuple(
+    damping / stiffness
+    for damping, stiffness in zip(const.SERVO_DAMPING_NMS_RAD, const.SERVO_STIFFNESS_NM_RAD, strict=True)
+)
 
 
 def checked_action(action: object) -> NDArray[np.float64]:
@@ -42,46 +46,50 @@ class RateControl:
     """Turn rate commands into the set points of the four position servos.
 
     Attributes:
-        reference_pos: Position that the servos hold, shape (4,) [rad].
-        reference_vel: Its rate, shape (4,) [rad/s].
+        reference_pos: Positions that the servos hold [rad], one per joint.
+        reference_vel: Their rates [rad/s].
     """
 
     def __init__(self) -> None:
-        self.reference_pos = np.zeros(4)
-        self.reference_vel = np.zeros(4)
+        self.reference_pos = [0.0] * 4
+        self.reference_vel = [0.0] * 4
 
-    def reset(self, joint_pos: NDArray[np.float64]) -> None:
+    def reset(self, joint_pos: ArrayLike) -> None:
         """Hold the given joint positions, shape (4,) [rad], at rest."""
-        self.reference_pos = np.array(joint_pos, dtype=np.float64)
-        self.reference_vel = np.zeros(4)
+        self.reference_pos = np.asarray(joint_pos, dtype=np.float64).tolist()
+        self.reference_vel = [0.0] * 4
 
-    def step(
-        self, action: NDArray[np.float64], joint_pos: NDArray[np.float64], dt_s: float
-    ) -> NDArray[np.float64]:
+    def step(self, command: Sequence[float], joint_pos: Sequence[float], dt_s: float) -> list[float]:
         """Advance the reference by one substep and return the servo set points.
 
+        Plain floats: four joints are too few for arrays to pay, and this runs in every substep.
+
         Args:
-            action: Checked rate commands in [-1, 1], shape (4,).
-            joint_pos: Measured joint positions, shape (4,) [rad].
+            command: Rate commands in [-1, 1], one per joint.
+            joint_pos: Measured joint positions [rad].
             dt_s: Length of the substep [s].
 
         Returns:
-            Set points, shape (4,) [rad]: the reference plus a velocity lead that cancels the servo's damping.
+            Set points [rad]: the reference plus a velocity lead that cancels the servo's damping.
         """
-        slew = _ACCEL * dt_s
-        vel = self.reference_vel + np.clip(action * _SPEED - self.reference_vel, -slew, slew)
-        vel = self._braked(vel)
-        pos = self.reference_pos + vel * dt_s
-        lead = const.SERVO_DEFLECTION_RAD
-        pos = np.minimum(np.maximum(pos, joint_pos - lead), joint_pos + lead)
-        self.reference_pos = np.minimum(np.maximum(pos, _LOWER), _UPPER)
-        self.reference_vel = vel
-        return self.reference_pos + vel * _VELOCITY_LEAD_S
+        set_points = []
+        for joint in range(4):
+            lower, upper = const.JOINT_RANGE_RAD[joint]
+            accel, measured = const.JOINT_ACCEL_RAD_S2[joint], joint_pos[joint]
+            pos, vel = self.reference_pos[joint], self.reference_vel[joint]
+            wanted = command[joint] * const.JOINT_SPEED_RAD_S[joint]
+            vel = _clipped(wanted, vel - accel * dt_s, vel + accel * dt_s)
+            # Towards a joint limit: no faster than can still be stopped at the rated deceleration.
+            vel = _clipped(
+                vel, -sqrt(2.0 * accel * max(pos - lower, 0.0)), sqrt(2.0 * accel * max(upper - pos, 0.0))
+            )
+            lead = const.SERVO_DEFLECTION_RAD
+            pos = _clipped(pos + vel * dt_s, measured - lead, measured + lead)
+            pos = _clipped(pos, lower, upper)
+            self.reference_pos[joint], self.reference_vel[joint] = pos, vel
+            set_points.append(pos + vel * _VELOCITY_LEAD_S[joint])
+        return set_points
 
-    def _braked(self, vel: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cap the speed towards a joint limit so that it can still be lost at the rated deceleration."""
-        to_upper = np.maximum(_UPPER - self.reference_pos, 0.0)
-        to_lower = np.maximum(self.reference_pos - _LOWER, 0.0)
-        return np.minimum(
-            np.maximum(vel, -np.sqrt(2.0 * _ACCEL * to_lower)), np.sqrt(2.0 * _ACCEL * to_upper)
-        )
+
+def _clipped(value: float, lower: float, upper: float) -> float:
+    return min(max(value, lower), upper)

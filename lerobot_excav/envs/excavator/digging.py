@@ -55,8 +55,8 @@ class DiggingResistance:
         # Integrated implicitly, the servo's damping acts like added inertia: M + dt D.
         self._added_mass = const.SUBSTEP_S * np.diag(const.SERVO_DAMPING_NMS_RAD)
         self._units = np.eye(model.nv)
-        self._force = np.zeros(3)
-        self._torque = np.zeros(3)
+        self._force: NDArray[np.float64] = np.zeros(3)
+        self._torque: NDArray[np.float64] = np.zeros(3)
         self._size_n = 0.0
         self._jacobian = np.zeros((6, model.nv))
         self._mass_matrix = np.zeros((model.nv, model.nv))

@@ -93,13 +93,13 @@ class ExcavatorMachine:
             ConfigurationError: The action has the wrong shape or a value that is not finite.
             ExcavError: The simulation diverged.
         """
-        command = checked_action(action)
+        command = checked_action(action).tolist()
         model, data = self.model, self.data
         self._resistance.set_reaction(reaction)
         self._box_contact_force_n = 0.0
         for remaining in range(SUBSTEPS, 0, -1):
             self._payload.approach(reaction.payload_mass_kg, reaction.payload_com_t, remaining)
-            data.ctrl[:] = self._control.step(command, data.qpos, const.SUBSTEP_S)
+            data.ctrl[:] = self._control.step(command, data.qpos.tolist(), const.SUBSTEP_S)
             mujoco.mj_step1(model, data)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)

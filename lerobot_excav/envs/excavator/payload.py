@@ -6,10 +6,8 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator import constants as const
 
-_GYRATION_SQUARED = np.array(const.PAYLOAD_GYRATION_M) ** 2
-_MIXING = (  # moments of inertia from squared radii of gyration along x, y, z: Ixx = m (ky^2 + kz^2) ...
-    np.ones((3, 3)) - np.eye(3)
-)
+# Moments of inertia of a unit mass from its radii of gyration: Ixx = ky^2 + kz^2 and so on.
+_UNIT_INERTIA_M2 = (np.ones((3, 3)) - np.eye(3)) @ np.array(const.PAYLOAD_GYRATION_M) ** 2
 
 
 class Payload:
@@ -50,7 +48,7 @@ class Payload:
             return
         # A jump of the mass would kick the joints; its rate is bounded, so a large change may take longer.
         limit = const.PAYLOAD_RATE_KG_S * const.SUBSTEP_S
-        self.mass_kg += float(np.clip((mass_kg - self.mass_kg) / substeps, -limit, limit))
+        self.mass_kg += min(max((mass_kg - self.mass_kg) / substeps, -limit), limit)
         if mass_kg > 0.0:
             self._com_t += (np.asarray(com_t) - self._com_t) / substeps
         self._write()
@@ -58,4 +56,4 @@ class Payload:
     def _write(self) -> None:
         self._model.body_mass[self._body] = self.mass_kg
         self._model.body_ipos[self._body] = self._com_t
-        self._model.body_inertia[self._body] = self.mass_kg * (_MIXING @ _GYRATION_SQUARED)
+        self._model.body_inertia[self._body] = self.mass_kg * _UNIT_INERTIA_M2

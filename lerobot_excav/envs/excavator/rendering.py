@@ -138,7 +138,7 @@ class WorksiteRenderer:
         visual = self._machine.model.vis.map
         near, far = (d * self._machine.model.stat.extent for d in (visual.znear, visual.zfar))
         # The buffer holds 1 at the near plane and 0 at the far one, hyperbolic in between.
-        return near * far / (near + buffer[::-1].astype(np.float64) * (far - near))
+        return np.asarray(near * far / (near + buffer[::-1].astype(np.float64) * (far - near)))
 
     def _unproject(self, camera: str, depth: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the world points (H, W, 3) at given distances along the optical axis."""

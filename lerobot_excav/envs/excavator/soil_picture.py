@@ -36,15 +36,15 @@ class SoilPicture:
 
     def update_skins(self, soil: Soil) -> None:
         """Move the vertices of the skins to the soil's surface, where it has changed."""
-        heights = soil.heights_m
-        if self._terrain_shown is None or not np.array_equal(heights, self._terrain_shown):
-            self._terrain_shown = heights.copy()
+        terrain = soil.heights_m
+        if self._terrain_shown is None or not np.array_equal(terrain, self._terrain_shown):
+            self._terrain_shown = terrain.copy()
             surface = soil.height_at(self._terrain_grid)
             self._write(surfaces.TERRAIN_SKIN, surfaces.skin_vertices(self._terrain_grid, surface))
-        heights = soil.container_heights_m
-        if heights is not None and (self._box_shown is None or not np.array_equal(heights, self._box_shown)):
-            self._box_shown = heights.copy()
-            surface = _resampled(heights, self._box_grid.shape[:2])
+        boxed = soil.container_heights_m
+        if boxed is not None and (self._box_shown is None or not np.array_equal(boxed, self._box_shown)):
+            self._box_shown = boxed.copy()
+            surface = _resampled(boxed, self._box_grid.shape[:2])
             # Bare floor shows where there is no soil, instead of two surfaces at one height.
             surface = np.where(surface < _LEAST_BOX_SOIL_M, _HIDDEN_M, surface)
             self._write(surfaces.BOX_SOIL_SKIN, surfaces.skin_vertices(self._box_grid, surface))

@@ -56,7 +56,7 @@ def skin_vertices(grid: NDArray[np.float64], heights_m: NDArray[np.float64]) -> 
     top = np.concatenate([grid, heights_m[..., None]], axis=-1).reshape(-1, 3)
     skirt = top[_border(heights_m.shape)]
     skirt[:, 2] = -_SKIRT_DEPTH_M
-    return np.concatenate([top, skirt]).astype(np.float32)
+    return np.concatenate([top, skirt], dtype=np.float32)
 
 
 def _grid(shape_m: tuple[float, float], spacing_m: float) -> NDArray[np.float64]:
@@ -80,7 +80,7 @@ def _faces(shape: tuple[int, ...]) -> NDArray[np.int32]:
     foot = index.size + np.arange(rim.size)
     rim_next, foot_next = np.roll(rim, -1), np.roll(foot, -1)
     skirt = np.concatenate([np.stack([foot, foot_next, rim_next], -1), np.stack([foot, rim_next, rim], -1)])
-    return np.concatenate([top, skirt]).astype(np.int32)
+    return np.concatenate([top, skirt], dtype=np.int32)
 
 
 def _add_skin(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float64]) -> None:
