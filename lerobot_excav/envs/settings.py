@@ -1,7 +1,7 @@
-"""What the settings shared by `--env.type=excavator` and `--robot.type=excavator_sim` allow.
+"""What the settings of `--env.type=excavator` and `--robot.type=excavator_sim` allow.
 
-The values are those of `envs.excavator` and `envs.soil`; a test keeps them equal. They are repeated here
-because reading them there would load the simulator for every command line that is parsed.
+Importing this loads no simulator, so that every command of LeRobot can parse its line quickly. For the same reason the
+names of the soil presets are repeated here; a test keeps them equal.
 """
 
 from collections.abc import Sequence
