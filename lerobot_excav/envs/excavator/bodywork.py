@@ -9,8 +9,16 @@ from lerobot_excav.envs.excavator import constants as const
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-_MACHINE_GROUP = 1
-_WORKING_BIT, _SURROUNDINGS_BIT = 1, 2
+
+# Bits of contype and conaffinity: the working end meets surroundings and carrier, never itself.
+WORKING_BIT = 1
+SURROUNDINGS_BIT = 2
+
+# Groups of geoms, by which the renderer hides things.
+SURROUNDINGS_GROUP = 0
+MACHINE_GROUP = 1
+COLLISION_GROUP = 3  # never drawn
+
 Vec = tuple[float, float, float]
 
 MATERIALS: dict[str, tuple[Vec, float]] = {
@@ -36,17 +44,17 @@ def dress_undercarriage(body: mujoco.MjsBody) -> None:
     """Draw crawler tracks, frame and dozer blade; the tracks stop the bucket."""
     for side in (-1.0, 1.0):
         y = 0.88 * side
-        _box(body, (0.0, y, 0.36), (1.05, 0.23, 0.34), "dark", collides=_SURROUNDINGS_BIT)
+        _box(body, (0.0, y, 0.36), (1.05, 0.23, 0.34), "dark", collides=SURROUNDINGS_BIT)
         for x in (-1.05, 1.05):
             _cylinder_across(body, (x, y, 0.36), 0.34, 0.23, "dark")
             _cylinder_across(body, (x, y, 0.36), 0.22, 0.25, "machine")
         _box(body, (0.0, y, 0.36), (0.80, 0.25, 0.10), "machine")
         _box(body, (1.55, 0.55 * side, 0.34), (0.30, 0.07, 0.08), "machine")
     _box(body, (0.0, 0.0, 0.45), (0.60, 0.70, 0.16), "machine")
-    _box(body, (1.85, 0.0, 0.28), (0.06, 1.10, 0.24), "machine", collides=_SURROUNDINGS_BIT)
+    _box(body, (1.85, 0.0, 0.28), (0.06, 1.10, 0.24), "machine", collides=SURROUNDINGS_BIT)
     body.add_geom(
         type=_CYLINDER, pos=[0.0, 0.0, 0.70], size=[0.55, 0.08, 0.0], material="dark", mass=0.0,
-        group=_MACHINE_GROUP, contype=0, conaffinity=0,
+        group=MACHINE_GROUP, contype=0, conaffinity=0,
     )  # fmt: skip
 
 
@@ -117,7 +125,7 @@ def add_cylinders(spec: mujoco.MjSpec) -> None:
     }
     for name, ends in anchors.items():
         tendon = spec.add_tendon(
-            name=f"{name}_cylinder", width=0.055, rgba=[0.55, 0.56, 0.58, 1.0], group=_MACHINE_GROUP
+            name=f"{name}_cylinder", width=0.055, rgba=[0.55, 0.56, 0.58, 1.0], group=MACHINE_GROUP
         )
         for i, (body_name, pos) in enumerate(ends):
             site = f"{name}_cylinder_{i}"
@@ -127,8 +135,8 @@ def add_cylinders(spec: mujoco.MjSpec) -> None:
 
 def _box(body: mujoco.MjsBody, pos: Vec, half_size: Vec, material: str, *, collides: int = 0) -> None:
     body.add_geom(
-        type=_BOX, pos=list(pos), size=list(half_size), material=material, mass=0.0, group=_MACHINE_GROUP,
-        contype=collides, conaffinity=_WORKING_BIT if collides else 0,
+        type=_BOX, pos=list(pos), size=list(half_size), material=material, mass=0.0, group=MACHINE_GROUP,
+        contype=collides, conaffinity=WORKING_BIT if collides else 0,
     )  # fmt: skip
 
 
@@ -136,7 +144,7 @@ def _cylinder_across(body: mujoco.MjsBody, pos: Vec, radius: float, half_width: 
     """Draw a cylinder whose axis runs along y."""
     body.add_geom(
         type=_CYLINDER, pos=list(pos), size=[radius, half_width, 0.0], quat=[0.5**0.5, 0.5**0.5, 0.0, 0.0],
-        material=material, mass=0.0, group=_MACHINE_GROUP, contype=0, conaffinity=0,
+        material=material, mass=0.0, group=MACHINE_GROUP, contype=0, conaffinity=0,
     )  # fmt: skip
 
 
@@ -150,7 +158,7 @@ def _beam(
     *,
     name: str = "",
     y: float = 0.0,
-    collides: int = _WORKING_BIT,
+    collides: int = WORKING_BIT,
 ) -> None:
     """Add a box along a line in the x-z plane."""
     start, end = np.array(start_xz), np.array(end_xz)
@@ -160,7 +168,7 @@ def _beam(
     body.add_geom(
         name=name, type=_BOX, pos=[middle[0], y, middle[1]], size=[length / 2, half_width, half_height],
         quat=[np.cos(angle / 2), 0.0, -np.sin(angle / 2), 0.0], material=material, mass=0.0,
-        group=_MACHINE_GROUP, contype=collides, conaffinity=_SURROUNDINGS_BIT if collides else 0,
+        group=MACHINE_GROUP, contype=collides, conaffinity=SURROUNDINGS_BIT if collides else 0,
         friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
     )  # fmt: skip
 
@@ -175,6 +183,6 @@ def _add_cheek(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, y: float) -
     mesh.smoothnormal = False
     body.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, pos=[0.0, y, 0.0], material="bucket",
-        mass=0.0, group=_MACHINE_GROUP, contype=_WORKING_BIT, conaffinity=_SURROUNDINGS_BIT,
+        mass=0.0, group=MACHINE_GROUP, contype=WORKING_BIT, conaffinity=SURROUNDINGS_BIT,
         friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
     )  # fmt: skip

@@ -52,8 +52,8 @@ class DiggingResistance:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._bucket = model.body("bucket").id
-        # Integrated implicitly, the servo's damping acts like added inertia: M + dt D.
-        self._added_mass = const.SUBSTEP_S * np.diag(const.SERVO_DAMPING_NMS_RAD)
+        self._added_inertia = const.SUBSTEP_S * np.array(const.SERVO_DAMPING_NMS_RAD)
+        self._torque_limit = np.array(const.JOINT_TORQUE_NM)
         self._units = np.eye(model.nv)
         self._force: NDArray[np.float64] = np.zeros(3)
         self._torque: NDArray[np.float64] = np.zeros(3)
@@ -106,6 +106,8 @@ class DiggingResistance:
         return self._jacobian[:3].T @ self._force + self._jacobian[3:].T @ self._torque
 
     def _implicit_mass(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Return M + dt D: integrated implicitly, a servo's damping acts like inertia, unless it is saturated."""
         for row, unit in zip(self._mass_matrix, self._units, strict=True):
             mujoco.mj_mulM(self._model, data, row, unit)
-        return self._mass_matrix + self._added_mass
+        is_free = np.abs(data.actuator_force) < self._torque_limit
+        return self._mass_matrix + np.diag(is_free * self._added_inertia)

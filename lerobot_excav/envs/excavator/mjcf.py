@@ -5,20 +5,17 @@ import numpy as np
 
 from lerobot_excav.envs.excavator import bodywork, cameras, surfaces
 from lerobot_excav.envs.excavator import constants as const
+from lerobot_excav.envs.excavator.bodywork import (
+    COLLISION_GROUP,
+    SURROUNDINGS_BIT,
+    SURROUNDINGS_GROUP,
+    WORKING_BIT,
+)
 from lerobot_excav.envs.excavator.cameras import CameraPose
 from lerobot_excav.envs.soil.container import Container
 
 GROUND_DROP_M = 0.02
 """The drawn ground lies this far below the real one, so that soil of zero height is not hidden by it."""
-
-# Bits of contype and conaffinity: the working end meets surroundings and carrier, never itself.
-WORKING_BIT = 1
-SURROUNDINGS_BIT = 2
-
-# Groups of geoms, by which the renderer hides things.
-SURROUNDINGS_GROUP = 0
-MACHINE_GROUP = 1
-COLLISION_GROUP = 3  # never drawn
 
 _AXIS_UP = (0.0, 0.0, 1.0)
 _AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift

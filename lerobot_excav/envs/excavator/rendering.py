@@ -12,8 +12,8 @@ from lerobot_excav.envs.excavator.offscreen import (
 # isort: split
 import mujoco
 
+from lerobot_excav.envs.excavator.bodywork import MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.excavator.mjcf import MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice
