@@ -1,0 +1,33 @@
+import dataclasses
+import math
+
+import pytest
+
+from lerobot_excav.envs.soil.parameters import PRESETS, PROVENANCE, SoilParameters
+from lerobot_excav.errors import ConfigurationError
+
+
+def test_every_number_names_its_unit_source_and_kind() -> None:
+    assert set(PROVENANCE) == {field.name for field in dataclasses.fields(SoilParameters)}
+    assert {p.kind for p in PROVENANCE.values()} <= {"datasheet", "paper", "derived", "tuned", "guess"}
+
+
+def test_sand_is_the_published_one() -> None:
+    sand = PRESETS["sand"]
+    assert sand.density_kg_m3 == 1474.0
+    assert math.degrees(sand.friction_angle_rad) == pytest.approx(39.0, abs=0.01)
+    assert sand.cohesion_pa == 0.0
+    assert sand.swell == 1.0
+
+
+def test_a_parcel_of_sand_weighs_0_94_kg() -> None:
+    assert PRESETS["sand"].parcel_mass_kg == pytest.approx(0.94, abs=0.005)
+
+
+def test_presets_differ_from_each_other() -> None:
+    assert len(set(PRESETS.values())) == len(PRESETS) == 4
+
+
+def test_a_value_out_of_range_is_named() -> None:
+    with pytest.raises(ConfigurationError, match=r"swell=0\.5 is out of range; allowed: 1\.0"):
+        dataclasses.replace(PRESETS["sand"], swell=0.5)

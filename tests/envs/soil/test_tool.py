@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
+from lerobot_excav.envs.soil.tool import Tool, ToolGeometry
+from lerobot_excav.errors import ConfigurationError
+
+TRIANGLE = np.array([(1.0, 0.0), (0.5, 0.5), (0.0, 0.0)])
+
+
+def tool(**changes: object) -> Tool:
+    values: dict[str, object] = {
+        "geometry": BUCKET,
+        "position_w": np.zeros(3),
+        "rotation_w": np.eye(3),
+        "linear_velocity_w": np.zeros(3),
+        "angular_velocity_w": np.zeros(3),
+    }
+    return Tool(**(values | changes))  # type: ignore[arg-type]
+
+
+def test_volume_and_centroid_of_a_triangle() -> None:
+    geometry = ToolGeometry(profile_t=TRIANGLE, inner_width_m=2.0)
+    assert geometry.struck_volume_m3 == pytest.approx(0.5)
+    np.testing.assert_allclose(geometry.centroid_t, [0.5, 0.0, 1.0 / 6.0])
+
+
+def test_the_first_plane_is_the_opening_and_the_last_two_are_the_sides() -> None:
+    planes = ToolGeometry(profile_t=TRIANGLE, inner_width_m=2.0).planes_t
+    np.testing.assert_allclose(planes[0], [0, 0, -1, 0], atol=1e-12)
+    np.testing.assert_allclose(planes[-2:], [[0, -1, 0, 1], [0, 1, 0, 1]])
+
+
+def test_corners_lie_on_the_planes_and_the_centroid_inside() -> None:
+    distance = BUCKET.corners_t @ BUCKET.planes_t[:, :3].T - BUCKET.planes_t[:, 3]
+    np.testing.assert_allclose(distance.max(axis=1), 0.0, atol=1e-12)
+    assert (BUCKET.planes_t[:, :3] @ BUCKET.centroid_t < BUCKET.planes_t[:, 3]).all()
+
+
+@pytest.mark.parametrize(
+    ("profile", "message"),
+    [
+        (TRIANGLE[:2], r"shape \(2, 2\)"),
+        (TRIANGLE[::-1], "not convex and counter-clockwise"),
+        (np.array([(1.0, 0.0), (0.5, 0.1), (0.4, 0.5), (0.0, 0.0)]), "not convex"),
+        (np.array([(1.0, 0.0), (0.5, 0.5), (0.0, -0.1)]), "z_t < 0"),
+        (np.array([(1.0, 0.0), (0.5, np.nan), (0.0, 0.0)]), "not finite"),
+    ],
+)
+def test_a_bad_profile_is_refused(profile: np.ndarray, message: str) -> None:
+    with pytest.raises(ConfigurationError, match=message):
+        ToolGeometry(profile_t=profile, inner_width_m=1.0)
+
+
+def test_a_bad_pose_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="position_w has shape"):
+        tool(position_w=np.zeros(2))
+    with pytest.raises(ConfigurationError, match=r"linear_velocity_w=.* is not finite"):
+        tool(linear_velocity_w=np.array([np.inf, 0, 0]))
+    with pytest.raises(ConfigurationError, match="off orthonormal"):
+        tool(rotation_w=2 * np.eye(3))
+
+
+@pytest.mark.parametrize("pitch", [-3.0, -1.5, 0.0, 0.4, 3.0])
+def test_pitch_is_read_from_the_rotation(pitch: float) -> None:
+    assert tool(rotation_w=rotation_at(pitch)).pitch_rad == pytest.approx(pitch)
+
+
+def test_a_tool_keeps_its_own_copy_of_the_pose() -> None:
+    position = np.zeros(3)
+    made = tool(position_w=position)
+    position[0] = 1.0
+    assert made.position_w[0] == 0.0
