@@ -55,7 +55,9 @@ class DigCycle:
             self.target_hit = bool(self.target.contains(self._worksite.machine.cutting_edge_pos_w))
             self.onset_time_s = self._ticks * TICK_S
         dumped = state.deposited_mass_kg >= LOADING_ONSET_KG and state.bucket_mass_kg < LOADING_ONSET_KG
-        self._empty_ticks = self._empty_ticks + 1 if dumped else 0
+        # Soil still in the air may yet fall into the box.
+        settled = dumped and self._worksite.soil.ledger_kg()["parcels"] == 0.0
+        self._empty_ticks = self._empty_ticks + 1 if settled else 0
 
     @property
     def is_complete(self) -> bool:

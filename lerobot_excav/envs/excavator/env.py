@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from lerobot_excav.envs.excavator.control import checked_action
 from lerobot_excav.envs.excavator.cycle import DigCycle
 from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
@@ -182,7 +183,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
         Raises:
             ConfigurationError: The action has another shape than (4,) or is not finite.
         """
-        command = require_action(action)
+        command = checked_action(action)
         cycle = self.cycle
         deposited_before_kg = cycle.state.deposited_mass_kg
         for _ in range(self._ticks_per_frame):
@@ -262,29 +263,6 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
             "frames": self._frame,
             **self.cycle.metrics(),
         }
-
-
-def require_action(action: np.ndarray) -> np.ndarray:
-    """Check a joystick command and clip it to [-1, 1].
-
-    Args:
-        action: Swing, boom, arm, bucket, shape (4,).
-
-    Returns:
-        The command as float64, shape (4,).
-
-    Raises:
-        ConfigurationError: Wrong shape, NaN or infinity.
-    """
-    command = np.asarray(action, dtype=np.float64)
-    require(
-        command.shape == (4,), f"action has shape {command.shape}; it must be (4,): swing, boom, arm, bucket"
-    )
-    require(
-        bool(np.isfinite(command).all()),
-        f"action={command.tolist()} is not finite; check the policy's statistics",
-    )
-    return np.clip(command, -1.0, 1.0)
 
 
 def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:

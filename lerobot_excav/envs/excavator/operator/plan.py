@@ -12,20 +12,22 @@ from lerobot_excav.envs.soil import Soil
 
 # Numbers of the plan (kind: tuned on train scenes).
 BUCKET_WIDTH_M = 0.72
-CUT_VOLUME_M3 = 0.40
-"""Soil to sweep in one cut [m3]: a heaped bucket (0.34) and what flows past its sides."""
 HOVER_HEIGHT_M = 0.45
 FLOOR_CLEARANCE_M = 0.06
 ENTRY_LENGTH_M = 0.35
 """Length over which the edge goes down to the full depth of cut [m]."""
 CUT_STEP_M = 0.05
 LEAST_RADIUS_M = 2.5
-CUT_END_PITCH_RAD = -2.15
+CURL_DRAW_M = 0.5
+"""How far the bucket is drawn towards the machine while it is rolled in [m]."""
+CURL_RISE_M = 0.3
 CARRY_PITCH_RAD = -3.0
 LIFT_PIN_HEIGHT_M = 1.9
 DUMP_PITCH_RAD = -0.75
-DUMP_REACH_M = 0.5
-"""How far the pin moves outwards while the bucket opens [m], so that the soil falls on the middle of the box."""
+DUMP_PIN_OFFSET_M = -0.2
+"""Where the pin hovers, from the middle of the box [m]: the soil leaves when the edge has swung out beyond it."""
+DUMP_REACH_M = 0.1
+"""How far the pin moves outwards while the bucket opens [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +56,8 @@ def plan_cut(soil: Soil, target: Target, variation: Variation) -> CutPlan:
     swing += variation.entry_across_m / radius
     radii = np.arange(entry_radius, LEAST_RADIUS_M, -CUT_STEP_M)
     surface = soil.height_at(world_from_cylinder(radii, np.full_like(radii, swing)))
-    heights = _cut_heights(radii, surface, variation.depth_m)
-    pitches = np.linspace(variation.attack_pitch_rad, CUT_END_PITCH_RAD, heights.size)
+    heights = _cut_heights(radii, surface, variation.depth_m, variation.cut_volume_m3)
+    pitches = np.linspace(variation.attack_pitch_rad, variation.roll_in_pitch_rad, heights.size)
     cut = [
         BucketPose(radius_m=float(r), height_m=float(z), pitch_rad=float(p), swing_rad=swing)
         for r, z, p in zip(radii, heights, pitches, strict=False)
@@ -72,8 +74,8 @@ def plan_cut(soil: Soil, target: Target, variation: Variation) -> CutPlan:
 def plan_curl(present: BucketPose) -> list[BucketPose]:
     """Plan the curl: close the bucket where it is, while drawing it up out of the soil."""
     curled = BucketPose.of_pin(
-        radius_m=present.pin_radius_m,
-        height_m=max(present.pin_height_m + 0.25, 0.9),
+        radius_m=max(present.pin_radius_m - CURL_DRAW_M, LEAST_RADIUS_M),
+        height_m=max(present.pin_height_m + CURL_RISE_M, 0.9),
         pitch_rad=CARRY_PITCH_RAD,
         swing_rad=present.swing_rad,
     )
@@ -111,14 +113,14 @@ def plan_dump(present: BucketPose, variation: Variation) -> list[BucketPose]:
 def _over_box(variation: Variation) -> BucketPose:
     radius, swing, _ = cylinder_from_world(np.asarray(TARGET_BOX.center_w))
     return BucketPose.of_pin(
-        radius_m=radius + variation.dump_along_m,
+        radius_m=radius + DUMP_PIN_OFFSET_M + variation.dump_along_m,
         height_m=TARGET_BOX.wall_height_m + variation.carry_height_m,
         pitch_rad=CARRY_PITCH_RAD,
         swing_rad=swing,
     )
 
 
-def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float) -> np.ndarray:
+def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float, volume_m3: float) -> np.ndarray:
     """Height of the edge along the cut [m], as long as it takes to sweep the wanted volume.
 
     Where the pile is too small for the wanted depth of cut, cut deeper rather than bring half a bucket.
@@ -128,7 +130,7 @@ def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float) -> np
         heights = np.maximum(surface_m - (depth_m + extra_m) * ramp, FLOOR_CLEARANCE_M)
         heights = np.minimum(heights, surface_m + FLOOR_CLEARANCE_M)
         swept_m3 = np.cumsum(np.maximum(surface_m - heights, 0.0)) * CUT_STEP_M * BUCKET_WIDTH_M
-        enough = np.nonzero(swept_m3 >= CUT_VOLUME_M3)[0]
+        enough = np.nonzero(swept_m3 >= volume_m3)[0]
         if enough.size:
             return heights[: max(int(enough[0]) + 1, 3)]
     # The whole pile along this line is less than a bucket: stop where it ends.

@@ -15,6 +15,8 @@ class Variation:
         entry_across_m: The same across the boom [m].
         depth_m: Depth of cut [m].
         attack_pitch_rad: Preferred pitch of the bucket chord at entry [rad].
+        cut_volume_m3: Soil to sweep before the bucket is rolled in [m3].
+        roll_in_pitch_rad: Pitch at the end of the cut [rad]; the curl goes on from there.
         carry_height_m: Height of the bucket pin above the box [m].
         dump_along_m: Where the load is dropped, along the boom from the centre of the box [m].
         pauses_s: Rest before each phase [s], shape (phases,).
@@ -26,6 +28,8 @@ class Variation:
     entry_across_m: float
     depth_m: float
     attack_pitch_rad: float
+    cut_volume_m3: float
+    roll_in_pitch_rad: float
     carry_height_m: float
     dump_along_m: float
     pauses_s: tuple[float, ...]
@@ -45,6 +49,9 @@ def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
         entry_across_m=rng.uniform(-0.1, 0.1),
         depth_m=rng.uniform(0.36, 0.46),
         attack_pitch_rad=rng.uniform(-1.75, -1.45),
+        # A flat bucket holds little more than this; the curl takes the rest.
+        cut_volume_m3=rng.uniform(0.24, 0.36),
+        roll_in_pitch_rad=rng.uniform(-2.8, -2.5),
         carry_height_m=rng.uniform(1.5, 1.7),
         dump_along_m=rng.uniform(-0.15, 0.15),
         # Most pauses are short, a few are noticeable.
