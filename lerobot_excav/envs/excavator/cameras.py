@@ -21,7 +21,7 @@ class CameraPose:
     fovy_deg: float
 
 
-MAIN = CameraPose(position=(3.0, -6.5, 9.2), target=(-1.4, 1.1, 0.0), fovy_deg=52.0)
+MAIN = CameraPose(position=(3.6, -4.6, 7.4), target=(-0.5, 0.25, 0.2), fovy_deg=46.0)
 """Fixed to the world: the whole dig area, the machine and the target box, from the front right.
 
 Every point of a pile is seen from more than 40 degrees above the horizontal, steeper than its slope (39 degrees for
