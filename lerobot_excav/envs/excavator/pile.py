@@ -9,6 +9,8 @@ from lerobot_excav.envs.soil import relax
 HEAP_X_RANGE_M = (-0.55, 0.55)
 HEAP_Y_RANGE_M = (-1.35, 1.35)
 PILE_MASS_RANGE_KG = (4800.0, 6000.0)
+BORDER_M = 0.3
+"""Bare strip along the border of the dig area [m], so that no pile starts out of bounds."""
 
 
 def draw_pile(
@@ -34,7 +36,8 @@ def draw_pile(
     cell_size_m = float(x_w[1] - x_w[0])
     volume_m3 = rng.uniform(*PILE_MASS_RANGE_KG) / density_kg_m3
     shape = _heaps(rng, x_w, y_w, repose_tan) + _ripples(rng, x_w, y_w)
-    heights = _fill_to_volume(shape, volume_m3 / cell_size_m**2)
+    roof = _roof(x_w, y_w, repose_tan)
+    heights = _fill_to_volume(shape, roof, volume_m3 / cell_size_m**2)
     return relax(heights, cell_size_m, repose_tan)
 
 
@@ -61,13 +64,20 @@ def _ripples(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray) -> np.n
     return waves
 
 
-def _fill_to_volume(shape: np.ndarray, column_sum_m: float) -> np.ndarray:
+def _roof(x_w: np.ndarray, y_w: np.ndarray, repose_tan: float) -> np.ndarray:
+    """Height above which a pile would slide off the soil grid, shape (nx, ny) [m]; zero near the border."""
+    inset_x = x_w.max() - BORDER_M - np.abs(x_w)
+    inset_y = y_w.max() - BORDER_M - np.abs(y_w)
+    return np.asarray(np.maximum(0.0, 0.9 * repose_tan * np.minimum(inset_x[:, None], inset_y[None, :])))
+
+
+def _fill_to_volume(shape: np.ndarray, roof: np.ndarray, column_sum_m: float) -> np.ndarray:
     """Raise or lower the shape until what stands above the floor has the wanted volume (bisection on the level)."""
     low, high = -float(shape.max()), column_sum_m
     for _ in range(80):
         level = 0.5 * (low + high)
-        if np.maximum(shape + level, 0.0).sum() < column_sum_m:
+        if np.clip(shape + level, 0.0, roof).sum() < column_sum_m:
             low = level
         else:
             high = level
-    return np.maximum(shape + high, 0.0)
+    return np.clip(shape + high, 0.0, roof)
