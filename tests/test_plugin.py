@@ -1,0 +1,118 @@
+"""Every command of LeRobot that discovers plugins knows our types, and loads no simulator to do so."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lerobot.policies.factory import get_policy_class
+from lerobot.robots import make_robot_from_config
+from lerobot.teleoperators import make_teleoperator_from_config
+
+from lerobot_excav import plugin
+from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
+from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
+from lerobot_excav.teleoperators.excavator_joystick.excavator_joystick import ExcavatorJoystick
+from lerobot_excav.teleoperators.excavator_operator.excavator_operator import ExcavatorOperator
+
+ROBOT = ["--robot.type=excavator_sim", "--robot.fps=7"]
+ENV = ["--env.type=excavator", "--env.fps=7"]
+BAD_FPS = "fps=7 is not known"
+
+# A setting of ours that cannot work: the command stops at it, and only if it knows the type.
+COMMANDS: dict[str, tuple[list[str], str]] = {
+    "record": ([*ROBOT, "--dataset.repo_id=a/b", "--dataset.single_task=dig"], BAD_FPS),
+    "replay": ([*ROBOT, "--dataset.repo_id=a/b", "--dataset.episode=0"], BAD_FPS),
+    "teleoperate": (
+        ["--robot.type=excavator_sim", "--teleop.type=excavator_joystick", "--teleop.pattern=crane"],
+        "teleop.pattern='crane' is not known",
+    ),
+    "train": (["--dataset.repo_id=a/b", "--policy.type=mask_act", *ENV], BAD_FPS),
+    "eval": (["--policy.type=mask_act", *ENV], BAD_FPS),
+    "rollout": (["--strategy.type=base", "--policy.type=mask_act", *ROBOT], BAD_FPS),
+    "calibrate": (["--teleop.type=excavator_operator", "--teleop.seed=-1"], "teleop.seed=-1"),
+}
+
+# Importing LeRobot takes far longer than parsing a command line, so the commands are forked from one process
+# that has imported LeRobot but not the plugin: each discovers it anew.
+PROBE = """
+import importlib, json, os, sys, traceback
+commands = json.loads(sys.argv[1])
+mains = {name: importlib.import_module(f"lerobot.scripts.lerobot_{name}").main for name in commands}
+assert not [name for name in sys.modules if "excav" in name]
+before = set(sys.modules)
+for name, (arguments, _) in commands.items():
+    child = os.fork()
+    if child == 0:
+        sys.stdout = sys.stderr = open(f"{name}.txt", "w")
+        sys.argv = [f"lerobot-{name}", *arguments]
+        try:
+            mains[name]()
+        except BaseException:
+            traceback.print_exc()
+        print("loaded:", *sorted({each.split(".")[0] for each in set(sys.modules) - before}))
+        print("modules:", *sorted(each for each in sys.modules if each.startswith("lerobot_excav")))
+        sys.stdout.flush()
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Run every command; return what each printed."""
+    folder = tmp_path_factory.mktemp("commands")
+    environment = os.environ | {"HF_HUB_OFFLINE": "1", "HF_LEROBOT_HOME": str(folder), "HF_HOME": str(folder)}
+    subprocess.run(
+        [sys.executable, "-c", PROBE, json.dumps(COMMANDS)],
+        check=True,
+        capture_output=True,
+        cwd=folder,
+        env=environment,
+    )
+    return {name: (folder / f"{name}.txt").read_text() for name in COMMANDS}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_discovers_the_plugin(outputs: dict[str, str], command: str) -> None:
+    assert COMMANDS[command][1] in outputs[command]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_discovery_loads_no_simulator(outputs: dict[str, str], command: str) -> None:
+    loaded, modules = (line.split()[1:] for line in outputs[command].splitlines()[-2:])
+    assert "lerobot_env_excav" in loaded
+    assert not {"mujoco", "numba", "pygame"} & set(loaded)
+    assert not [name for name in modules if name.startswith("lerobot_excav.envs.excavator")]
+
+
+@pytest.mark.parametrize(
+    ("make", "config", "device"),
+    [
+        (make_robot_from_config, plugin.ExcavatorSimConfig, ExcavatorSim),
+        (make_teleoperator_from_config, plugin.ExcavatorJoystickConfig, ExcavatorJoystick),
+        (make_teleoperator_from_config, plugin.ExcavatorOperatorConfig, ExcavatorOperator),
+    ],
+)
+def test_lerobot_finds_the_class_of_a_device(make: Any, config: Any, device: Any, tmp_path: Path) -> None:
+    made = make(config(calibration_dir=tmp_path))
+    assert isinstance(made, device)
+    assert made.name == made.config.type
+
+
+def test_lerobot_finds_the_class_of_the_policy() -> None:
+    assert get_policy_class("mask_act") is MaskACTPolicy
+
+
+def test_the_list_is_complete() -> None:
+    assert all(hasattr(plugin, name) for name in plugin.__all__)
+    assert {getattr(plugin, name).get_choice_name(getattr(plugin, name)) for name in plugin.__all__} == {
+        "excavator",
+        "mask_act",
+        "excavator_sim",
+        "excavator_joystick",
+        "excavator_operator",
+    }
