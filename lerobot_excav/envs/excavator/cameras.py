@@ -1,4 +1,4 @@
-"""Poses of the two cameras."""
+"""Poses of the cameras."""
 
 from dataclasses import dataclass
 
@@ -22,11 +22,14 @@ class CameraPose:
 
 
 MAIN = CameraPose(position=(3.6, -4.6, 7.4), target=(-0.5, 0.25, 0.2), fovy_deg=46.0)
-"""Fixed to the world: the whole dig area, the machine and the target box, from the front right.
+"""Fixed to the world: the pile and the ground around it, the carrier and most of the target box, from the front right.
 
 Every point of a pile is seen from more than 40 degrees above the horizontal, steeper than its slope (39 degrees for
 sand), so that no dig region hides behind the ridge.
 """
+
+OVERVIEW = CameraPose(position=(3.0, -6.5, 9.2), target=(-1.4, 1.1, 0.0), fovy_deg=52.0)
+"""Fixed to the world, from the same side but wider: machine, dig area and target box. For people, not policies."""
 
 CAB = CameraPose(position=(0.98, 0.62, 1.45), target=(4.8, -0.05, -0.7), fovy_deg=62.0)
 """Fixed to the house (swing frame, origin on the slewing ring): along the boom down to the dig area."""

@@ -110,4 +110,4 @@ class DiggingResistance:
         for row, unit in zip(self._mass_matrix, self._units, strict=True):
             mujoco.mj_mulM(self._model, data, row, unit)
         is_free = np.abs(data.actuator_force) < self._torque_limit
-        return self._mass_matrix + np.diag(is_free * self._added_inertia)
+        return np.asarray(self._mass_matrix + np.diag(is_free * self._added_inertia))

@@ -30,8 +30,8 @@ def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mu
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
-        `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main` and `cab`,
-        and the skins `terrain` and `box_soil` that draw the soil.
+        `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main`, `cab` and
+        `overview`, and the skins `terrain` and `box_soil` that draw the soil.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "excavator"
@@ -92,6 +92,7 @@ def _add_ground(spec: mujoco.MjSpec) -> None:
     )
     world.add_light(name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False)
     _add_camera(world, "main", cameras.MAIN)
+    _add_camera(world, "overview", cameras.OVERVIEW)
 
 
 def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
@@ -118,6 +119,7 @@ def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=list(pos),
             size=list(size),
+            mass=0.0,  # it stands still
             group=SURROUNDINGS_GROUP,
             contype=SURROUNDINGS_BIT,
             conaffinity=WORKING_BIT,

@@ -18,7 +18,7 @@ from lerobot_excav.envs.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice
 
-CAMERAS = ("main", "cab")
+CAMERAS = ("main", "cab", "overview")
 _MAX_GEOMS = 2000
 
 
@@ -51,7 +51,7 @@ class WorksiteRenderer:
         """Return a colour picture (H, W, 3), uint8.
 
         Args:
-            camera: `main` or `cab`.
+            camera: `main`, `cab` or `overview`.
             soil: The soil to draw.
 
         Raises:

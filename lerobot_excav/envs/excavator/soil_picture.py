@@ -39,7 +39,8 @@ class SoilPicture:
         terrain = soil.heights_m
         if self._terrain_shown is None or not np.array_equal(terrain, self._terrain_shown):
             self._terrain_shown = terrain.copy()
-            surface = soil.height_at(self._terrain_grid)
+            # A hair inside the border, beyond which the soil reports bare floor.
+            surface = soil.height_at((1.0 - 1e-9) * self._terrain_grid)
             self._write(surfaces.TERRAIN_SKIN, surfaces.skin_vertices(self._terrain_grid, surface))
         boxed = soil.container_heights_m
         if boxed is not None and (self._box_shown is None or not np.array_equal(boxed, self._box_shown)):
@@ -51,7 +52,8 @@ class SoilPicture:
 
     def add_moving_soil(self, scene: mujoco.MjvScene, soil: Soil) -> None:
         """Append the load in the bucket and the flying parcels to a scene."""
-        rgba = np.append(self._model.mat_rgba[self._soil_material, :3], 1.0).astype(np.float32)
+        rgb = surfaces.GRAIN_BRIGHTNESS * self._model.mat_rgba[self._soil_material, :3]
+        rgba = np.append(rgb, 1.0).astype(np.float32)
         self._add_load(scene, soil, rgba)
         size = np.full(3, soil.parcel_radius_m)
         for position in soil.parcel_positions_w[: scene.maxgeom - scene.ngeom]:
