@@ -12,7 +12,7 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 
 SMALL_STEM_WIDTH = 32
-SMALL_STAGE_WIDTHS = (32, 64, 128)  # strides 4, 8, 16
+SMALL_STAGES = ((32, 1), (64, 2), (128, 2))  # width, stride of each residual block
 
 
 class Backbone(nn.Module):
@@ -28,7 +28,7 @@ class Backbone(nn.Module):
         norm = nn.BatchNorm2d if config.backbone_norm == "batch" else FrozenBatchNorm2d
         if config.vision_backbone == "resnet_small":
             self.stages: nn.Module = small_resnet(norm)
-            self.feature_count = SMALL_STAGE_WIDTHS[-1]
+            self.feature_count = SMALL_STAGES[-1][0]
         else:
             self.stages, self.feature_count = torchvision_resnet(config, norm)
 
@@ -42,19 +42,24 @@ class Backbone(nn.Module):
 def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
     """Build a narrow residual network of stride 16, for pictures of about 100 pixels and training from scratch.
 
+    Its first convolution has stride 4: at stride 2 that layer and its normalisation cost as much as all the rest.
+
     Args:
         norm: Normalisation layer.
 
     Returns:
         Network from (N, 4, H, W) to (N, 128, H / 16, W / 16).
     """
-    stem = nn.Conv2d(3, SMALL_STEM_WIDTH, kernel_size=5, stride=2, padding=2, bias=False)
+    stem = nn.Conv2d(3, SMALL_STEM_WIDTH, kernel_size=7, stride=4, padding=3, bias=False)
     nn.init.kaiming_normal_(stem.weight, mode="fan_out", nonlinearity="relu")
     layers: list[nn.Module] = [with_mask_channel(stem), norm(SMALL_STEM_WIDTH), nn.ReLU(inplace=True)]
     width_in = SMALL_STEM_WIDTH
-    for width in SMALL_STAGE_WIDTHS:
-        shortcut = nn.Sequential(nn.Conv2d(width_in, width, kernel_size=1, stride=2, bias=False), norm(width))
-        layers.append(BasicBlock(width_in, width, stride=2, downsample=shortcut, norm_layer=norm))
+    for width, stride in SMALL_STAGES:
+        same = width == width_in and stride == 1
+        shortcut = (
+            None if same else nn.Sequential(nn.Conv2d(width_in, width, 1, stride, bias=False), norm(width))
+        )
+        layers.append(BasicBlock(width_in, width, stride=stride, downsample=shortcut, norm_layer=norm))
         width_in = width
     return nn.Sequential(*layers)
 
