@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.capacity import Capacity, Load
-from lerobot_excav.envs.soil.cutting import Window, cut, freeze_covered
+from lerobot_excav.envs.soil.cutting import Window, cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, poses_between
@@ -71,7 +71,7 @@ class Bucket:
             return
         self._pose = None
         self._window = _NO_WINDOW
-        field.thaw()
+        field.uncover()
 
     def move(self, tool: Tool, field: HeightField, floor_depth_m: float) -> float:
         """Sweep the bucket from its last pose to this one; return the volume [m3] pushed over the border.
@@ -150,12 +150,12 @@ class Bucket:
         return lost
 
     def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
-        """Freeze the columns that the bucket covers, free those that it has left."""
+        """Let the underside of the bucket hold avalanches back."""
         window = field.window(pose.place(geometry.corners_t))
-        freeze_covered(
+        set_ceiling(
             field.heights,
             field.active,
-            field.frozen,
+            field.ceiling,
             field.grid,
             geometry.planes_t,
             *pose.arrays,

@@ -24,10 +24,10 @@ from lerobot_excav.envs.soil.tool import ToolGeometry
 
 Array = NDArray[np.float64]
 
-_STRIPS = 96
+_STRIPS_PER_PART = 8
 _BISECTIONS = 40
 
-_U, _FLOOR, _ROOF, _LIMIT, _HEAPS = range(5)
+_U, _FLOOR, _ROOF, _LIMIT, _HEAPS, _WIDTH = range(6)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,8 +64,8 @@ def _strip(planes: Array, cos: float, sin: float, u: float) -> tuple[float, floa
 
 @kernel
 def build_strips(
-    profile: Array, planes: Array, slope_tan: float, pitch: float, support: float, count: int
-) -> tuple[Array, float]:
+    profile: Array, planes: Array, slope_tan: float, pitch: float, support: float, per_part: int
+) -> Array:
     """Cut the cross-section at a pitch into strips that can hold soil.
 
     Args:
@@ -74,11 +74,11 @@ def build_strips(
         slope_tan: Tangent of the repose angle.
         pitch: Angle of x_t above the horizontal [rad].
         support: Closed share of the opening, from its lower edge, in [0, 1].
-        count: Number of strips.
+        per_part: Strips between two neighbouring corners of the cross-section, the end of the support included.
 
     Returns:
-        (count, 5) rows of u, floor, roof, free-surface limit [m] and 1 if the strip can heap above its roof
-        (rows with roof = floor hold nothing), and the width of a strip.
+        (n * per_part, 6) rows of u, floor, roof, free-surface limit [m], 1 if the strip can heap above its roof,
+        and width [m]; rows with roof = floor hold nothing.
     """
     cos, sin = math.cos(pitch), math.sin(pitch)
     u_all = profile[:, 0] * cos - profile[:, 1] * sin
@@ -88,13 +88,15 @@ def build_strips(
         u_lower, v_lower, u_upper, v_upper = u_upper, v_upper, u_lower, v_lower
     u_start = u_lower + support * (u_upper - u_lower)
     v_start = v_lower + support * (v_upper - v_lower)
-    u_min, width = u_all.min(), (u_all.max() - u_all.min()) / count
-    strips = np.zeros((count, 5))
-    for k in range(count):
-        u = u_min + (k + 0.5) * width
+    breaks = np.sort(np.append(u_all, u_start))
+    strips = np.zeros(((len(breaks) - 1) * per_part, 6))
+    for k in range(len(strips)):
+        part = k // per_part
+        width = (breaks[part + 1] - breaks[part]) / per_part
+        u = breaks[part] + (k % per_part + 0.5) * width
         low, high, floor_face, roof_face = _strip(planes, cos, sin, u)
         closed = support > 0.0 and (u - u_lower) * (u - u_start) <= 0.0
-        strips[k, 0] = u
+        strips[k, 0], strips[k, 5] = u, width
         if high <= low or (floor_face == 0 and not closed):
             continue
         strips[k, 1], strips[k, 2] = low, high
@@ -103,7 +105,7 @@ def build_strips(
         else:
             strips[k, 3] = min(v_start + slope_tan * abs(u - u_start), v_upper + slope_tan * abs(u - u_upper))
             strips[k, 4] = 1.0 if roof_face == 0 else 0.0
-    return strips, width
+    return strips
 
 
 @kernel
@@ -118,9 +120,7 @@ def _heap(height: float, width: float, slope_tan: float) -> tuple[float, float]:
 
 
 @kernel
-def fill(
-    strips: Array, strip_width: float, width: float, slope_tan: float, level: float
-) -> tuple[float, float, float]:
+def fill(strips: Array, width: float, slope_tan: float, level: float) -> tuple[float, float, float]:
     """Return volume [m3] and first moments in u and v [m4] of the load below a level."""
     volume, moment_u, moment_v = 0.0, 0.0, 0.0
     for k in range(len(strips)):
@@ -134,25 +134,25 @@ def fill(
             heap_area, heap_moment = _heap(top - high, width, slope_tan)
             area += heap_area
             moment += heap_area * high + heap_moment
-        volume += area * strip_width
-        moment_u += area * strip_width * u
-        moment_v += moment * strip_width
+        volume += area * strips[k, 5]
+        moment_u += area * strips[k, 5] * u
+        moment_v += moment * strips[k, 5]
     return volume, moment_u, moment_v
 
 
 @kernel
-def find_level(strips: Array, strip_width: float, width: float, slope_tan: float, volume: float) -> float:
+def find_level(strips: Array, width: float, slope_tan: float, volume: float) -> float:
     """Return the level below which a load of this volume lies; above everything if there is more than fits."""
     low, high = math.inf, -math.inf
     for k in range(len(strips)):
         if strips[k, 2] > strips[k, 1]:
             low = min(low, strips[k, 1])
             high = max(high, max(strips[k, 2], strips[k, 3]))
-    if not low < high or fill(strips, strip_width, width, slope_tan, high)[0] <= volume:
+    if not low < high or fill(strips, width, slope_tan, high)[0] <= volume:
         return math.inf
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        if fill(strips, strip_width, width, slope_tan, middle)[0] < volume:
+        if fill(strips, width, slope_tan, middle)[0] < volume:
             low = middle
         else:
             high = middle
@@ -180,7 +180,7 @@ class Capacity:
             support: Share of the opening, from its lower edge, that soil in front closes, in [0, 1]. It never
                 makes the volume smaller, though a closed part of the opening carries no heap.
         """
-        return self._best(pitch_rad, support)[2]
+        return self._best(pitch_rad, support)[1]
 
     def load(self, volume_m3: float, pitch_rad: float, support: float = 0.0) -> Load:
         """Return how a load of some volume lies in the bucket.
@@ -192,42 +192,44 @@ class Capacity:
         centroid = self.geometry.centroid_t
         if volume_m3 <= 0.0:
             return Load(com_t=centroid, surface_t=np.zeros((0, 2)))
-        strips, step, _ = self._best(pitch_rad, support)
-        level = find_level(strips, step, self.geometry.inner_width_m, self._slope_tan, volume_m3)
-        filled, moment_u, moment_v = self._fill(strips, step, level)
+        strips, _ = self._best(pitch_rad, support)
+        level = find_level(strips, self.geometry.inner_width_m, self._slope_tan, volume_m3)
+        filled, moment_u, moment_v = self._fill(strips, level)
         com = centroid
         if filled > 0.0:
             lying = self._to_tool(np.array([[moment_u / filled, moment_v / filled]]), pitch_rad)[0]
             share = min(1.0, filled / volume_m3)
             com = share * np.array([lying[0], 0.0, lying[1]]) + (1.0 - share) * centroid
         if filled < 0.5 * volume_m3:
-            strips, step = self._strips(pitch_rad, 1.0)
-            level = find_level(strips, step, self.geometry.inner_width_m, self._slope_tan, volume_m3)
+            strips = self._strips(pitch_rad, 1.0)
+            level = find_level(strips, self.geometry.inner_width_m, self._slope_tan, volume_m3)
         return Load(com_t=com, surface_t=self._surface(strips, level, pitch_rad))
 
-    def _best(self, pitch_rad: float, support: float) -> tuple[Array, float, float]:
-        """Return strips, their width and the retained volume, with the support if that holds more."""
-        strips, step = self._strips(pitch_rad, 0.0)
-        volume = self._fill(strips, step, math.inf)[0]
+    def _best(self, pitch_rad: float, support: float) -> tuple[Array, float]:
+        """Return strips and the retained volume, with the support if that holds more."""
+        strips = self._strips(pitch_rad, 0.0)
+        volume = self._fill(strips, math.inf)[0]
         if support > 0.0:
-            held, _ = self._strips(pitch_rad, support)
-            more = self._fill(held, step, math.inf)[0]
+            held = self._strips(pitch_rad, support)
+            more = self._fill(held, math.inf)[0]
             if more > volume:
-                return held, step, more
-        return strips, step, volume
+                return held, more
+        return strips, volume
 
-    def _strips(self, pitch_rad: float, support: float) -> tuple[Array, float]:
-        return build_strips(self._profile, self._planes, self._slope_tan, pitch_rad, support, _STRIPS)
+    def _strips(self, pitch_rad: float, support: float) -> Array:
+        return build_strips(
+            self._profile, self._planes, self._slope_tan, pitch_rad, support, _STRIPS_PER_PART
+        )
 
-    def _fill(self, strips: Array, step: float, level: float) -> tuple[float, float, float]:
-        return fill(strips, step, self.geometry.inner_width_m, self._slope_tan, level)
+    def _fill(self, strips: Array, level: float) -> tuple[float, float, float]:
+        return fill(strips, self.geometry.inner_width_m, self._slope_tan, level)
 
     def _surface(self, strips: Array, level: float, pitch_rad: float) -> Array:
         top = np.minimum(strips[:, _LIMIT], level)
         roof = strips[:, _ROOF]
         heap = np.minimum(top - roof, 0.5 * self._slope_tan * self.geometry.inner_width_m)
         top = np.where((strips[:, _HEAPS] > 0) & (heap > 0), roof + heap, np.minimum(top, roof))
-        holds = (roof > strips[:, _FLOOR]) & (top > strips[:, _FLOOR])
+        holds = (roof > strips[:, _FLOOR]) & (top > strips[:, _FLOOR]) & (strips[:, _WIDTH] > 0)
         return self._to_tool(np.stack([strips[holds, _U], top[holds]], axis=1), pitch_rad)
 
     @staticmethod

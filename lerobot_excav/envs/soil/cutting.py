@@ -78,12 +78,12 @@ def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[f
 
 @kernel
 def is_covered(
-    heights: Array, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int
+    surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int
 ) -> bool:
-    """Tell whether the surface of a column lies inside or above the bucket, or less than a cell below it."""
+    """Tell whether a surface height of a column lies inside the bucket or above it."""
     x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
     low, high, _ = column_interval(planes, position, rotation, x, y)
-    return low < high and heights[i, j] > low - grid[2]
+    return low < high and surface > low
 
 
 @kernel
@@ -98,7 +98,7 @@ def push_aside(
     direction: tuple[float, float],
     volume: float,
 ) -> float:
-    """Put a volume on the first column along a level direction that the bucket does not cover.
+    """Put a volume on the first column along a level direction that has room for it beside or below the bucket.
 
     Returns:
         The volume if that column lies beyond the border, else 0.
@@ -109,8 +109,9 @@ def push_aside(
             return volume
         i = int((x - grid[0]) / grid[2] + 0.5)
         j = int((y - grid[1]) / grid[3] + 0.5)
-        if not is_covered(heights, grid, planes, position, rotation, i, j):
-            heights[i, j] += volume / (grid[2] * grid[3])
+        raised = heights[i, j] + volume / (grid[2] * grid[3])
+        if not is_covered(raised, grid, planes, position, rotation, i, j):
+            heights[i, j] = raised
             mark_around(active, i, j)
             return 0.0
         x += direction[0] * grid[2]
@@ -234,26 +235,27 @@ def cut(
 
 
 @kernel
-def freeze_covered(
+def set_ceiling(
     heights: Array,
     active: Mask,
-    frozen: Mask,
+    ceiling: Array,
     grid: Grid,
     planes: Array,
     position: Array,
     rotation: Array,
     window: Window,
-) -> int:
-    """Freeze the columns of a window that the bucket covers, free the others; return how many are frozen.
+) -> None:
+    """Set the ceiling of the columns of a window to the underside of the bucket, or to infinity beside it.
 
     The plates thereby hold back avalanches that the height field alone would let through them.
     """
-    count = 0
     for i in range(window[0], window[1]):
         for j in range(window[2], window[3]):
-            covered = is_covered(heights, grid, planes, position, rotation, i, j)
-            if frozen[i, j] and not covered:
+            x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
+            low, high, _ = column_interval(planes, position, rotation, x, y)
+            new = low if low < high else math.inf
+            if new != ceiling[i, j] and (
+                new < heights[i, j] + grid[2] or ceiling[i, j] < heights[i, j] + grid[2]
+            ):
                 mark_around(active, i, j)
-            frozen[i, j] = 1 if covered else 0
-            count += 1 if covered else 0
-    return count
+            ceiling[i, j] = new

@@ -17,6 +17,7 @@ P = W sin(b + phi) / sin(a + delta + b + phi), which holds on any surface.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,7 @@ def failure_angle(rake_rad: float, friction_rad: float, steel_rad: float) -> flo
     return 0.5 * (low + high)
 
 
+@cache
 def failure_table(friction_rad: float, steel_rad: float) -> Array:
     """Return (n, 3) rows of rake [rad], failure angle [rad] and cohesion factor, by 1 degree of rake."""
     count = round(math.degrees(RAKE_MAX_RAD - RAKE_MIN_RAD)) + 1
@@ -86,4 +88,6 @@ def failure_table(friction_rad: float, steel_rad: float) -> Array:
     for rake in np.linspace(RAKE_MIN_RAD, RAKE_MAX_RAD, count):
         angle = failure_angle(rake, friction_rad, steel_rad)
         rows.append((rake, angle, earthmoving_factors(rake, angle, friction_rad, steel_rad).cohesion))
-    return np.array(rows)
+    table = np.array(rows)
+    table.flags.writeable = False  # every soil of the same friction shares it
+    return table

@@ -21,8 +21,8 @@ class Fidelity:
 
 
 FIDELITIES = {
-    "fast": Fidelity(vertical_bins=2, substep_cells=1.0, sweeps_per_tick=4, force_slices=4),
+    "fast": Fidelity(vertical_bins=2, substep_cells=1.0, sweeps_per_tick=6, force_slices=4),
     "standard": Fidelity(vertical_bins=4, substep_cells=0.5, sweeps_per_tick=8, force_slices=8),
-    "fine": Fidelity(vertical_bins=8, substep_cells=0.25, sweeps_per_tick=16, force_slices=12),
+    "fine": Fidelity(vertical_bins=8, substep_cells=0.25, sweeps_per_tick=12, force_slices=12),
 }
 """Known levels by name; all keep the same ledger and are deterministic."""

@@ -203,7 +203,7 @@ class DiggingResistance:
         """Tabulate the failure angles of a soil."""
         p = parameters
         self._slices = slices
-        self._table = failure_table(p.friction_angle_rad, p.steel_friction_angle_rad)
+        self._table = np.array(failure_table(p.friction_angle_rad, p.steel_friction_angle_rad))
         weight = p.density_kg_m3 * GRAVITY_M_S2
         friction = (p.friction_angle_rad, p.steel_friction_angle_rad, p.cohesion_pa)
         self._soil = np.array(

@@ -78,7 +78,7 @@ class HeightField:
     Attributes:
         heights: (nx, ny) heights above the floor [m], index along x first.
         active: (nx, ny) columns that the next avalanche sweep looks at.
-        frozen: (nx, ny) columns whose surface lies inside or just under the bucket; they take no part in avalanches.
+        ceiling: (nx, ny) heights up to which soil can avalanche [m]: the underside of the bucket, else infinite.
         grid: Centre of the first cell and cell sizes.
     """
 
@@ -87,7 +87,7 @@ class HeightField:
         cell_m = (float(cell_m[0]), float(cell_m[1]))
         self.heights: Array = np.zeros(shape)
         self.active: Mask = np.zeros(shape, dtype=np.uint8)
-        self.frozen: Mask = np.zeros(shape, dtype=np.uint8)
+        self.ceiling: Array = np.full(shape, np.inf)
         self.grid: Grid = (-0.5 * (shape[0] - 1) * cell_m[0], -0.5 * (shape[1] - 1) * cell_m[1], *cell_m)
         self._delta: Array = np.zeros(shape)
         self._border_height_m = border_height_m
@@ -129,7 +129,7 @@ class HeightField:
         )
         self.heights[:] = new
         self.active[:] = 1
-        self.frozen[:] = 0
+        self.ceiling[:] = np.inf
         self._at_rest = False
 
     def sample(self, points: Array) -> Array:
@@ -150,9 +150,9 @@ class HeightField:
         """Look for avalanches again: columns were marked active from outside."""
         self._at_rest = False
 
-    def thaw(self) -> None:
-        """Let all columns take part in avalanches again."""
-        self.frozen[:] = 0
+    def uncover(self) -> None:
+        """Remove all ceilings."""
+        self.ceiling[:] = np.inf
         self.active[:] = 1
         self._at_rest = False
 
@@ -173,7 +173,7 @@ class HeightField:
                 break
             cell_m = (self.grid[2], self.grid[3])
             over, changed = sweep(
-                self.heights, self._delta, self.active, self.frozen, cell_m, slope_tan, self._border_height_m
+                self.heights, self._delta, self.active, self.ceiling, cell_m, slope_tan, self._border_height_m
             )
             lost += over
             self._at_rest = changed == 0

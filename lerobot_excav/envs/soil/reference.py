@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 def sweep(
     heights: Array,
-    frozen: NDArray[np.uint8],
+    ceiling: Array,
     cell_m: tuple[float, float],
     slope_tan: float,
     border_height: float,
@@ -26,13 +26,14 @@ def sweep(
     nx, ny = heights.shape
     result, over_border = heights.copy(), 0.0
     padded = np.pad(heights, 1, constant_values=border_height)
-    blocked = np.pad(frozen, 1)
+    limit = np.pad(ceiling, 1, constant_values=math.inf)
     for a, b in [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]:
         distance = math.hypot(a * cell_m[0], b * cell_m[1])
         other = padded[1 + a : 1 + a + nx, 1 + b : 1 + b + ny]
-        taker_frozen = blocked[1 + a : 1 + a + nx, 1 + b : 1 + b + ny] > 0
-        excess = heights - other - slope_tan * distance
-        flows = (excess > REST_TAN * distance) & (frozen == 0) & ~taker_frozen
+        with np.errstate(invalid="ignore"):  # a closed border is as high as its ceiling: infinite
+            room = limit[1 + a : 1 + a + nx, 1 + b : 1 + b + ny] - other
+        excess = np.minimum(heights - other - slope_tan * distance, room)
+        flows = (excess > REST_TAN * distance) & (heights <= ceiling)
         moved = np.where(flows, FLOW_FRACTION * excess, 0.0)
         result -= moved
         arrived = np.zeros((nx + 2, ny + 2))
@@ -66,7 +67,7 @@ def crossed_face(planes: Array, before: Array, now: Array) -> int:
 
 
 def retained_volume(
-    geometry: ToolGeometry, slope_tan: float, pitch: float, support: float, spacing_m: float = 0.01
+    geometry: ToolGeometry, slope_tan: float, pitch: float, support: float, spacing_m: float = 0.002
 ) -> float:
     """Return the volume [m3] of all points on a lattice that are retained, by the rules of `capacity`."""
     cos, sin = math.cos(pitch), math.sin(pitch)
@@ -84,11 +85,10 @@ def retained_volume(
         if floor_is_opening and not closed:
             continue
         surface = min(start[1] + slope_tan * abs(u - start[0]), upper[1] + slope_tan * abs(u - upper[0]))
-        for y in centres:
-            top = roof if closed else min(surface, roof)
-            if roof_is_opening and not closed:
-                top = min(surface, roof + slope_tan * (half - abs(y)))
-            total += max(0.0, top - floor)
+        top = np.full_like(centres, roof if closed else min(surface, roof))
+        if roof_is_opening and not closed:
+            top = np.minimum(surface, roof + slope_tan * (half - np.abs(centres)))
+        total += float(np.maximum(0.0, top - floor).sum())
     return total * spacing_m**2
 
 

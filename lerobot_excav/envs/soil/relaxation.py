@@ -3,6 +3,9 @@
 Soil runs from a column to each of its eight neighbours that lies lower than the repose slope allows, a fixed
 fraction of the excess per sweep. What leaves one column enters another, so the volume is exact. Only columns
 marked active are looked at; a column that changes marks itself and its neighbours for the next sweep.
+
+A rigid body over a column gives it a ceiling: soil below the ceiling takes no more than fits under it, and soil
+above the ceiling lies in or on that body and takes no part.
 """
 
 import math
@@ -39,7 +42,7 @@ def mark_around(active: Mask, i: int, j: int) -> None:
 def _column_outflow(
     heights: Array,
     delta: Array,
-    frozen: Mask,
+    ceiling: Array,
     i: int,
     j: int,
     rise: tuple[float, float, float],
@@ -56,10 +59,10 @@ def _column_outflow(
             kind = 2 if a != 0 and b != 0 else (0 if a != 0 else 1)
             p, q = i + a, j + b
             outside = p < 0 or q < 0 or p >= nx or q >= ny
-            if not outside and frozen[p, q]:
-                continue
             other = border_height if outside else heights[p, q]
             excess = heights[i, j] - other - rise[kind]
+            if not outside:
+                excess = min(excess, ceiling[p, q] - other)
             if excess > rest[kind]:
                 moved = FLOW_FRACTION * excess
                 delta[i, j] -= moved
@@ -75,7 +78,7 @@ def sweep(
     heights: Array,
     delta: Array,
     active: Mask,
-    frozen: Mask,
+    ceiling: Array,
     cell_m: tuple[float, float],
     slope_tan: float,
     border_height: float,
@@ -86,7 +89,7 @@ def sweep(
         heights: (nx, ny) heights [m], changed in place.
         delta: (nx, ny) work array of zeros; zero again afterwards.
         active: (nx, ny) columns to look at; afterwards those for the next sweep.
-        frozen: (nx, ny) columns that neither give nor take.
+        ceiling: (nx, ny) heights above which soil neither gives nor takes [m]; infinite without a body above.
         cell_m: Cell size along x and y.
         slope_tan: Tangent of the repose angle.
         border_height: Height outside the border [m]; infinite for a closed border.
@@ -104,9 +107,9 @@ def sweep(
         for j in range(ny):
             if active[i, j]:
                 active[i, j] = 0
-                if frozen[i, j]:
+                if heights[i, j] > ceiling[i, j]:
                     continue
-                over_border += _column_outflow(heights, delta, frozen, i, j, rise, rest, border_height)
+                over_border += _column_outflow(heights, delta, ceiling, i, j, rise, rest, border_height)
                 i_low, i_high = min(i_low, i), max(i_high, i)
                 j_low, j_high = min(j_low, j), max(j_high, j)
     changed = 0
@@ -147,10 +150,10 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
     )
     delta = np.zeros_like(heights)
     active = np.ones(heights.shape, dtype=np.uint8)
-    frozen = np.zeros(heights.shape, dtype=np.uint8)
+    ceiling = np.full(heights.shape, math.inf)
     cell = (float(cell_size_m), float(cell_size_m))
     for _ in range(_MAX_SWEEPS):
-        _, changed = sweep(heights, delta, active, frozen, cell, float(slope_tan), math.inf)
+        _, changed = sweep(heights, delta, active, ceiling, cell, float(slope_tan), math.inf)
         if changed == 0:
             return heights
     raise ExcavError(f"no rest after {_MAX_SWEEPS} sweeps; use a coarser cell_size_m than {cell_size_m}.")

@@ -35,7 +35,7 @@ def test_a_full_bucket_of_sand_weighs_what_operators_load() -> None:
 def test_retention_is_the_volume_of_the_retained_points(pitch: float, support: float) -> None:
     capacity = Capacity(BUCKET, SLOPE)
     expected = max(reference.retained_volume(BUCKET, SLOPE, pitch, s) for s in (0.0, support))
-    assert capacity.retained_volume(pitch, support) == pytest.approx(expected, rel=0.02, abs=0.004)
+    assert capacity.retained_volume(pitch, support) == pytest.approx(expected, rel=0.01, abs=0.001)
 
 
 def test_nothing_stays_in_a_bucket_that_faces_down() -> None:

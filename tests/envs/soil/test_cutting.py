@@ -1,0 +1,160 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil import reference
+from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
+from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
+from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.motion import Pose
+
+CELL = 0.05
+PLANES = BUCKET.planes_t
+
+
+def rotation(yaw: float, pitch: float, roll: float) -> np.ndarray:
+    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    return about_z @ rotation_at(pitch) @ about_x
+
+
+def flat(height: float) -> HeightField:
+    field = HeightField((60, 60), (CELL, CELL), 0.0)
+    field.reset(np.full((60, 60), height))
+    return field
+
+
+def pose(edge: tuple[float, float, float], turned: np.ndarray) -> Pose:
+    return Pose(position=np.array(edge) - turned @ np.array([1.15, 0.0, 0.0]), rotation=turned)
+
+
+def move(
+    field: HeightField, before: Pose, now: Pose, room: float = 1.0, bins: int = 4
+) -> tuple[float, float]:
+    window = field.window(now.place(BUCKET.corners_t))
+    return cut(field.heights, field.active, field.grid, PLANES, before.arrays, now.arrays, window, bins, room)
+
+
+angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
+
+
+@given(angles=angles, x=st.floats(-1.2, 1.2), y=st.floats(-1.2, 1.2))
+@settings(max_examples=80, deadline=None)
+def test_a_vertical_line_is_inside_exactly_where_its_points_are(
+    angles: tuple[float, float, float], x: float, y: float
+) -> None:
+    turned, z = rotation(*angles), np.arange(-2.0, 2.0, 0.001)
+    low, high, top = column_interval(PLANES, np.zeros(3), turned, x, y)
+    found = reference.column_interval(PLANES, np.zeros(3), turned, np.array([x, y]), z)
+    if found is None:
+        assert high - low <= 0.001
+        return
+    assert low == pytest.approx(found[0], abs=0.0011)
+    assert high == pytest.approx(found[1], abs=0.0011)
+    upper_end = turned.T @ np.array([x, y, high])
+    assert PLANES[top, :3] @ upper_end == pytest.approx(PLANES[top, 3], abs=1e-9)
+
+
+points = st.tuples(st.floats(-0.2, 1.5), st.floats(-0.6, 0.6), st.floats(-0.3, 0.8))
+
+
+@given(before=points, mix=st.lists(st.floats(0.01, 1.0), min_size=16, max_size=16))
+@settings(max_examples=100, deadline=None)
+def test_a_point_came_through_the_face_that_the_reference_finds(
+    before: tuple[float, float, float], mix: list[float]
+) -> None:
+    now = np.array(mix) @ BUCKET.corners_t / sum(mix)
+    expected = reference.crossed_face(PLANES, np.array(before), now)
+    assert crossed_face(PLANES, before, tuple(now)) == expected
+    assert (expected == ALREADY_INSIDE) == bool(reference.inside(PLANES, np.array([before]))[0])
+
+
+@given(
+    angles=angles,
+    edge=st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(0.0, 0.6)),
+    step=st.tuples(st.floats(-0.025, 0.025), st.floats(-0.025, 0.025), st.floats(-0.025, 0.025)),
+    room=st.sampled_from([0.0, 0.001, 1.0]),
+)
+@settings(max_examples=60, deadline=None)
+def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(
+    angles: tuple[float, float, float],
+    edge: tuple[float, float, float],
+    step: tuple[float, float, float],
+    room: float,
+) -> None:
+    turned, field = rotation(*angles), flat(0.5)
+    before, now = pose(edge, turned), pose(tuple(np.add(edge, step)), turned)
+    volume = field.volume_m3
+    entered, lost = move(field, before, now, room)
+    assert field.volume_m3 + entered + lost == pytest.approx(volume, abs=1e-12)
+    assert 0.0 <= entered <= room
+    assert (field.heights >= 0.0).all()
+    for i, x in enumerate(field.centres(0)):
+        for j, y in enumerate(field.centres(1)):
+            low, high, _ = column_interval(PLANES, now.position, turned, x, y)
+            if low < high and high >= 0.5:  # no soil above the bucket that could have fallen in
+                assert field.heights[i, j] <= max(low, 0.0) + 1e-9
+
+
+def test_soil_before_the_opening_enters() -> None:
+    turned, field = rotation_at(math.radians(-120)), flat(0.5)
+    entered, _ = move(field, pose((0.0, 0.0, 0.2), turned), pose((-0.025, 0.0, 0.2), turned))
+    assert entered > 0.0
+
+
+def test_soil_behind_the_shell_is_pushed_not_loaded() -> None:
+    turned, field = rotation_at(math.radians(-90)), flat(0.5)
+    start = pose((0.0, 0.0, 0.2), turned)
+    move(field, start, start)  # clear the bucket first
+    ahead = field.heights[:, 30].copy()
+    entered, _ = move(field, start, pose((0.05, 0.0, 0.2), turned))
+    assert entered == 0.0
+    assert (field.heights[:, 30] - ahead).max() > 0.0  # it piles up behind the back
+
+
+def test_a_side_plate_pushes_sideways() -> None:
+    turned, field = rotation_at(math.radians(-150)), flat(0.5)
+    start = pose((-0.3, 0.0, 0.2), turned)
+    while move(field, start, start)[0] > 0.0:
+        pass  # soil above the opening falls in
+    before = field.heights.copy()
+    entered, _ = move(field, start, pose((-0.3, 0.05, 0.2), turned))
+    grown = np.argwhere(field.heights > before + 1e-12)
+    assert entered == pytest.approx(0.0, abs=1e-12)
+    assert len(grown) > 0
+    assert (field.centres(1)[grown[:, 1]] > 0.36).all()
+
+
+def test_a_full_bucket_pushes_a_heap_before_it() -> None:
+    turned, field = rotation_at(math.radians(-120)), flat(0.5)
+    start = pose((0.0, 0.0, 0.2), turned)
+    move(field, start, start)  # clear the bucket first
+    before = field.heights.copy()
+    entered, _ = move(field, start, pose((-0.05, 0.0, 0.2), turned), room=0.0)
+    raised = np.argwhere(field.heights > before + 1e-12)
+    assert entered == 0.0
+    assert len(raised) > 0
+    assert (field.centres(0)[raised[:, 0]] < -0.05).all()
+
+
+def test_more_bins_see_a_thinner_layer() -> None:
+    """Two samples per column decide for half a column at a time, eight see the corner of the opening."""
+    turned = rotation_at(math.radians(-135))
+    amounts = [
+        move(flat(0.5), pose((0.0, 0.0, 0.2), turned), pose((-0.02, 0.0, 0.16), turned), bins=bins)[0]
+        for bins in (2, 8)
+    ]
+    assert amounts[0] != amounts[1]
+    assert amounts[0] == pytest.approx(amounts[1], rel=0.2)
+
+
+def test_soil_over_the_border_is_counted() -> None:
+    turned, field = rotation_at(math.radians(-120)), flat(0.5)
+    volume = field.volume_m3
+    edge = -1.5 + 0.06
+    _, lost = move(field, pose((edge, 0.0, 0.2), turned), pose((edge - 0.05, 0.0, 0.2), turned), room=0.0)
+    assert lost > 0.0
+    assert field.volume_m3 + lost == pytest.approx(volume, abs=1e-12)

@@ -1,0 +1,124 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil import reference
+from lerobot_excav.envs.soil.benchmark import BOX
+from lerobot_excav.envs.soil.container import Container
+from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
+from lerobot_excav.envs.soil.soil import Soil
+from lerobot_excav.errors import ConfigurationError
+
+TICK = 0.02
+TILTED = Container(
+    center_w=np.array([5.0, 0.5, 0.2]), half_extent_m=np.array([1.0, 0.6]), wall_height_m=0.8, yaw_rad=0.4
+)
+
+
+def fall(soil: Soil, seconds: float) -> None:
+    for _ in range(round(seconds / TICK)):
+        soil.step(TICK)
+
+
+@pytest.mark.parametrize("height", [0.5, 1.0, 2.5])
+def test_a_parcel_falls_for_the_time_of_free_fall(height: float) -> None:
+    soil = Soil()
+    soil.add_parcels([[0.3, 0.2, height + soil.parcel_radius_m]], [[0.0, 0.0, 0.0]])
+    expected = math.sqrt(2 * height / GRAVITY_M_S2)
+    ticks = 0
+    while len(soil.parcel_positions_w):
+        soil.step(TICK)
+        ticks += 1
+    assert ticks == math.ceil(expected / TICK - 1e-9)
+
+
+@given(velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 3)))
+@settings(max_examples=20, deadline=None)
+def test_the_flight_is_a_parabola_and_keeps_its_energy(velocity: tuple[float, float, float]) -> None:
+    soil = Soil()
+    start = np.array([0.0, 0.0, 5.0])
+    soil.add_parcels([start], [velocity])
+    fall(soil, 0.4)
+    np.testing.assert_allclose(
+        soil.parcel_positions_w[0], reference.free_fall(start, np.array(velocity), 0.4), atol=1e-9
+    )
+    speed = soil._parcels.velocities_w[0]
+    energy = 0.5 * speed @ speed + GRAVITY_M_S2 * soil.parcel_positions_w[0, 2]
+    assert energy == pytest.approx(0.5 * np.dot(velocity, velocity) + GRAVITY_M_S2 * 5.0)
+
+
+def test_each_parcel_brings_its_mass_and_lands_where_it_falls() -> None:
+    soil = Soil(container=BOX)
+    soil.add_parcels([[0.0, 0.0, 1.0], [-3.75, 4.75, 1.0], [4.0, 0.0, 1.0]], np.zeros((3, 3)))
+    assert soil.ledger_kg()["parcels"] == pytest.approx(3 * soil.parcel_mass_kg)
+    fall(soil, 1.0)
+    ledger = soil.ledger_kg()
+    for place in ("grid", "box", "out_of_bounds"):
+        assert ledger[place] == pytest.approx(soil.parcel_mass_kg)
+
+
+def test_a_wall_stops_a_parcel_from_outside_and_from_inside() -> None:
+    soil = Soil(container=TILTED)
+    axis = TILTED.axes_w[0]
+    outside, inside = TILTED.center_w[:2] + 1.3 * axis, TILTED.center_w[:2]
+    speed = 8.0 * axis
+    soil.add_parcels([[*outside, 0.7]], [[*-speed, 0.0]])
+    fall(soil, 1.0)
+    assert soil.ledger_kg()["box"] == 0.0
+    assert soil.ledger_kg()["out_of_bounds"] == pytest.approx(soil.parcel_mass_kg)
+    soil.add_parcels([[*inside, 0.7]], [[*speed, 0.0]])
+    fall(soil, 1.0)
+    assert soil.ledger_kg()["box"] == pytest.approx(soil.parcel_mass_kg)
+
+
+def test_a_parcel_above_the_wall_flies_over_it() -> None:
+    soil = Soil(container=TILTED)
+    axis = TILTED.axes_w[0]
+    soil.add_parcels([[*(TILTED.center_w[:2] + 1.6 * axis), 1.6]], [[*(-3.0 * axis), 0.0]])
+    fall(soil, 1.0)
+    assert soil.ledger_kg()["box"] == pytest.approx(soil.parcel_mass_kg)
+
+
+@given(
+    x=st.floats(3.0, 7.0),
+    y=st.floats(-2.0, 3.0),
+    vx=st.floats(-9, 9),
+    vy=st.floats(-9, 9),
+    z=st.floats(0.3, 2.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_no_parcel_passes_a_wall_below_its_top(x: float, y: float, vx: float, vy: float, z: float) -> None:
+    soil = Soil(container=TILTED)
+    soil.add_parcels([[x, y, z]], [[vx, vy, 0.0]])
+    low = z < 1.0  # below the top of the wall all the way
+    starts_inside = bool((np.abs(TILTED.to_local(np.array([x, y]))) < TILTED.half_extent_m).all())
+    fall(soil, 1.0)
+    in_box = soil.ledger_kg()["box"] > 0.0
+    assert sum(soil.ledger_kg().values()) == pytest.approx(soil.parcel_mass_kg)
+    if low:
+        assert in_box == starts_inside
+
+
+def test_soil_heaped_above_the_wall_runs_out_of_the_box() -> None:
+    small = Container(
+        center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0
+    )
+    soil = Soil(container=small)
+    for _ in range(100):
+        soil.add_parcels([[4.0, 0.0, 0.9]], np.zeros((1, 3)))
+        fall(soil, 0.4)
+    ledger = soil.ledger_kg()
+    assert ledger["out_of_bounds"] > 5.0
+    assert sum(ledger.values()) == pytest.approx(100 * soil.parcel_mass_kg, abs=1e-6)
+    assert soil.container_heights_m is not None
+    assert soil.container_heights_m[0].max() < 0.2 + 0.05
+
+
+def test_bad_parcels_are_refused() -> None:
+    with pytest.raises(ConfigurationError, match=r"allowed: both \(n, 3\)"):
+        Soil().add_parcels(np.zeros((2, 3)), np.zeros((1, 3)))
+    with pytest.raises(ConfigurationError, match="not finite"):
+        Soil().add_parcels([[0.0, 0.0, np.nan]], np.zeros((1, 3)))
