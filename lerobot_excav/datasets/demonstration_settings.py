@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.envs.settings import (
     SCENE_SETS,
     SOILS,

@@ -18,11 +18,11 @@ from tqdm import tqdm
 from lerobot_excav.datasets.assembly import append_episode, create_dataset
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.episode_store import EpisodeStore
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.partial_run import PartialRun
 from lerobot_excav.datasets.provenance import read_provenance, write_provenance
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig, play_demonstration
-from lerobot_excav.datasets.schema import Pair
 from lerobot_excav.datasets.workers import worker_pool
 from lerobot_excav.errors import DatasetError, ExcavError
 

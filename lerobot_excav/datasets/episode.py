@@ -6,7 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from lerobot_excav.datasets.schema import CAMERAS, Pair
+from lerobot_excav.datasets.pair import Pair
+from lerobot_excav.datasets.schema import CAMERAS
 
 
 class Environment(Protocol):

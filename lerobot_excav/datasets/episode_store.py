@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lerobot_excav.datasets.episode import Episode
-from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.pair import Pair
 
 # Only a stopover: LeRobot compresses again, so speed counts here (level 1 takes a third of level 6's time).
 PNG_LEVEL = 1

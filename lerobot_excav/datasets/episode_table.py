@@ -1,9 +1,10 @@
-"""Reading a dataset episode by episode, straight from its columns.
+"""Reading a dataset episode by episode, straight from its files (LeRobot's dataset format v3.0).
 
 LeRobot's own reader first copies all pictures into a cache; what the index and the checks need is a small part of them.
 """
 
 import io
+import json
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from lerobot.datasets import LeRobotDatasetMetadata
 from PIL import Image
 
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
     PAIR_KEY,
@@ -24,9 +25,10 @@ from lerobot_excav.datasets.schema import (
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
-    Pair,
 )
 from lerobot_excav.errors import DatasetError
+
+CODEBASE_VERSION = "v3.0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,16 +109,36 @@ class EpisodeTable:
         return values[0]
 
 
-def open_metadata(root: Path) -> LeRobotDatasetMetadata:
-    """Read the metadata of a dataset on disk.
+@dataclass(frozen=True, kw_only=True)
+class DatasetInfo:
+    """What `meta/info.json` says.
+
+    Attributes:
+        fps: Frames per second.
+        total_episodes: Number of episodes.
+        features: Feature descriptions by key.
+    """
+
+    fps: int
+    total_episodes: int
+    features: dict[str, Any]
+
+
+def read_info(root: Path) -> DatasetInfo:
+    """Read what a dataset on disk says about itself.
 
     Raises:
-        DatasetError: There is none.
+        DatasetError: There is no dataset, or it has another format.
     """
-    # Without this check the library would ask the Hub for it.
-    if not (root / "meta" / "info.json").is_file():
-        raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json")
-    return LeRobotDatasetMetadata(repo_id=f"local/{root.name}", root=root)
+    try:
+        info = json.loads((root / "meta" / "info.json").read_text())
+    except FileNotFoundError:
+        raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json") from None
+    if info["codebase_version"] != CODEBASE_VERSION:
+        raise DatasetError(
+            f"{root} has the format {info['codebase_version']}; this needs {CODEBASE_VERSION}, so convert it"
+        )
+    return DatasetInfo(fps=info["fps"], total_episodes=info["total_episodes"], features=info["features"])
 
 
 def iterate_episodes(
@@ -132,11 +154,9 @@ def iterate_episodes(
     Yields:
         One table per episode, frames in order.
     """
-    metadata = open_metadata(root)
-    wanted = range(metadata.total_episodes) if episodes is None else episodes
-    files = dict.fromkeys(str(metadata.get_data_file_path(index)) for index in sorted(wanted))
-    for file in files:
-        yield from _episodes_of_file(root / file, keys, set(wanted))
+    wanted = set(range(read_info(root).total_episodes) if episodes is None else episodes)
+    for path in sorted(root.glob("data/*/*.parquet")):
+        yield from _episodes_of_file(path, keys, wanted)
 
 
 def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iterator[EpisodeTable]:
@@ -151,3 +171,21 @@ def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iter
                 yield EpisodeTable(
                     index=index, length=rows.num_rows, columns={key: rows[key] for key in keys}
                 )
+
+
+def require_single_task(root: Path, episodes: Collection[int]) -> None:
+    """Check that `lerobot-train` can hold out exactly the episodes it is told to; it splits task by task.
+
+    Raises:
+        DatasetError: The episodes have several task descriptions.
+    """
+    tasks = {
+        index
+        for table in iterate_episodes(root, ["task_index"], episodes=episodes)
+        for index in table.array("task_index")
+    }
+    if len(tasks) > 1:
+        raise DatasetError(
+            f"the chosen episodes have {len(tasks)} task descriptions, and lerobot-train splits each of them apart; "
+            "give them one with `lerobot-edit-dataset --operation.type=modify_tasks`, or train without --split"
+        )

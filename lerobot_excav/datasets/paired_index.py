@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, open_metadata
+from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
     MASK_KEY,
@@ -46,7 +46,7 @@ def build_index(root: Path) -> pd.DataFrame:
     Raises:
         DatasetError: A column is missing, or contradicts another.
     """
-    require_columns(open_metadata(root).features)
+    require_columns(read_info(root).features)
     rows = [_row(episode) for episode in iterate_episodes(root, INDEX_KEYS)]
     index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
     return _with_verdicts(index, _stored(root))
@@ -130,6 +130,6 @@ def read_index(root: Path) -> pd.DataFrame:
     hint = f"rebuild it with `lerobot-excav index {root}`"
     if index is None:
         raise DatasetError(f"{root} has no {INDEX_PATH}; {hint}")
-    if len(index) != open_metadata(root).total_episodes:
+    if len(index) != read_info(root).total_episodes:
         raise DatasetError(f"{root / INDEX_PATH} is stale: it has {len(index)} episodes; {hint}")
     return index

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.errors import DatasetError
 
 PROVENANCE_PATH = Path("meta/excav_demonstrations.json")

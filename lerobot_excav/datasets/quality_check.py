@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 
 from lerobot_excav.datasets.episode_check import MAIN_KEY, episode_problems, scene_problems
-from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, open_metadata
+from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, build_index, store_index
 from lerobot_excav.datasets.replay_check import replay_problem, soil_of
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
-from lerobot_excav.datasets.schema import Pair, require_columns
+from lerobot_excav.datasets.schema import require_columns
 from lerobot_excav.errors import require
 
 
@@ -42,13 +43,13 @@ def check_dataset(
         DatasetError: A column is missing or contradictory, or the soil is unknown.
         ConfigurationError: An episode that does not exist, or a negative number of replays.
     """
-    metadata = open_metadata(root)
-    require_columns(metadata.features)
-    wanted = sorted(range(metadata.total_episodes) if episodes is None else set(episodes))
-    unknown = [index for index in wanted if not 0 <= index < metadata.total_episodes]
+    info = read_info(root)
+    require_columns(info.features)
+    wanted = sorted(range(info.total_episodes) if episodes is None else set(episodes))
+    unknown = [index for index in wanted if not 0 <= index < info.total_episodes]
     require(
         not unknown,
-        f"--episodes names {unknown}; the dataset has episodes 0 to {metadata.total_episodes - 1}",
+        f"--episodes names {unknown}; the dataset has episodes 0 to {info.total_episodes - 1}",
     )
     require(replays >= 0, f"--replays={replays} must not be negative")
 
@@ -59,7 +60,7 @@ def check_dataset(
     if sample:
         rig, soil = rig or ExcavatorRig(with_images=False), soil or soil_of(root)
         for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
-            problem = replay_problem(rig, recorded, fps=metadata.fps, soil=soil)
+            problem = replay_problem(rig, recorded, fps=info.fps, soil=soil)
             problems[recorded.index] = [problem] if problem else []
 
     checked = index["episode_index"].isin(wanted)

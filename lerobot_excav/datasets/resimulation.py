@@ -13,7 +13,7 @@ import numpy as np
 from lerobot.datasets import LeRobotDataset, add_features
 
 from lerobot_excav.datasets.episode import Episode, replay
-from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, open_metadata
+from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import (
@@ -71,22 +71,22 @@ def complete_recording(
 
 
 def _require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
-    metadata = open_metadata(root)
-    present = [key for key in excav_features() if key in metadata.features]
+    info = read_info(root)
+    present = [key for key in excav_features() if key in info.features]
     if present:
         raise DatasetError(
             f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
         )
-    missing = [index for index in range(metadata.total_episodes) if index not in session]
+    missing = [index for index in range(info.total_episodes) if index not in session]
     if missing:
         raise DatasetError(
             f"the session has no line for episodes {missing}; is it the session of this recording?"
         )
-    for index in range(metadata.total_episodes):
+    for index in range(info.total_episodes):
         episode = session[index]
-        if episode.fps != metadata.fps:
+        if episode.fps != info.fps:
             raise DatasetError(
-                f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {metadata.fps}; "
+                f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {info.fps}; "
                 "record with --robot.fps equal to --dataset.fps"
             )
         if episode.restarts:

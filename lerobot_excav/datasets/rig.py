@@ -8,7 +8,7 @@ import numpy as np
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.episode import Environment, Episode, Operator, demonstrate
-from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.pair import Pair
 
 
 class Rig(Protocol):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.schema import Pair
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.errors import DatasetError
 
 SESSION_PATH = Path("meta/excav_session.jsonl")

@@ -24,8 +24,8 @@ class ToyEnv:
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         self.scene_id, self.target_id = options["scene_id"], options["target_id"]
         rng = np.random.default_rng(self.scene_id)
-        self.view = rng.integers(0, 256, (self.settings.height, self.settings.width, 3), dtype=np.uint8)
         self.joint_pos = rng.uniform(-1, 1, 4)
+        self.view = rng.integers(0, 256, (self.settings.height, self.settings.width, 3), dtype=np.uint8)
         self.joint_vel = np.zeros(4)
         self.frame = 0
         return self._observe(), self._info()

@@ -8,10 +8,10 @@ from lerobot.datasets import LeRobotDataset
 
 from lerobot_excav.datasets.demonstrations import record_demonstrations
 from lerobot_excav.datasets.episode_store import EpisodeStore
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.partial_run import PartialRun
 from lerobot_excav.datasets.provenance import read_provenance
 from lerobot_excav.datasets.rig import play_demonstration
-from lerobot_excav.datasets.schema import Pair
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 

@@ -4,12 +4,12 @@ from lerobot.datasets.feature_utils import features_equal_for_merge
 from lerobot.processor import make_default_processors
 from lerobot.utils.feature_utils import combine_feature_dicts
 
+from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import (
     ACTION_NAMES,
     CAMERAS,
     ROBOT_TYPE,
     STATE_NAMES,
-    Pair,
     dataset_features,
     excav_features,
     require_columns,
@@ -40,7 +40,7 @@ def test_names_are_those_of_the_simulated_robot():
     from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 
     assert (STATE_NAMES, ACTION_NAMES, CAMERAS) == (robot.STATE_NAMES, robot.ACTION_NAMES, robot.CAMERAS)
-    assert ROBOT_TYPE == ExcavatorSim.name
+    assert ExcavatorSim.name == ROBOT_TYPE
 
 
 def test_recorded_features_plus_the_excav_columns_merge_with_scripted_ones():

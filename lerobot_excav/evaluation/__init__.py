@@ -1,0 +1,1 @@
+"""Evaluation: `metrics` reads what was measured, `statistics` gives intervals, `comparison` and `report` make tables."""

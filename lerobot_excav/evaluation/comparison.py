@@ -1,0 +1,91 @@
+"""Two runs on the same scenes and targets, compared pair by pair."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lerobot_excav.errors import DatasetError, require
+from lerobot_excav.evaluation.metrics import EpisodeKey, Run
+from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, paired_bootstrap
+
+MEASURES = ("target_success", "is_success", "retained_mass_kg")
+RATES = ("target_success", "is_success")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """Difference of one measure between two runs.
+
+    Attributes:
+        measure: Field of `EpisodeMetrics`.
+        difference: Second minus first, over scenes and targets.
+        p_value: McNemar's exact test; None for measures that are no rates, or with several seeds, whose episodes on
+            one scene are not independent.
+    """
+
+    measure: str
+    difference: Interval
+    p_value: float | None
+
+
+def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Difference]:
+    """Compare two runs.
+
+    Args:
+        first: Reference.
+        second: What is compared with it.
+        rng: Source of the bootstrap.
+
+    Raises:
+        DatasetError: The runs show different scenes or targets.
+    """
+    require_same_keys(first, second)
+    return [_difference(measure, first, second, rng) for measure in MEASURES]
+
+
+def require_same_keys(first: Run, second: Run) -> None:
+    """Raise `DatasetError` unless two runs show the same scenes and targets."""
+    missing = set(first.keys) ^ set(second.keys)
+    if missing:
+        examples = ", ".join(str(key) for key in sorted(missing)[:3])
+        raise DatasetError(
+            f"{first.label} and {second.label} differ in {len(missing)} scenes and targets ({examples}, …), so they "
+            "cannot be compared pairwise; evaluate both with the same --seed and --eval.n_episodes"
+        )
+
+
+def means_by_key(run: Run, measure: str) -> np.ndarray:
+    """Return a measure per scene and target, averaged over seeds, in the order of `run.keys`."""
+    return np.array([_mean(run, key, measure) for key in run.keys])
+
+
+def _mean(run: Run, key: EpisodeKey, measure: str) -> float:
+    return float(np.mean([getattr(evaluation.episodes[key], measure) for evaluation in run.evaluations]))
+
+
+def _difference(measure: str, first: Run, second: Run, rng: np.random.Generator) -> Difference:
+    values = means_by_key(first, measure), means_by_key(second, measure)
+    testable = measure in RATES and len(first.evaluations) == len(second.evaluations) == 1
+    p_value = None
+    if testable:
+        only_first = int(np.sum((values[0] == 1) & (values[1] == 0)))
+        only_second = int(np.sum((values[0] == 0) & (values[1] == 1)))
+        p_value = mcnemar_exact(only_first, only_second)
+    return Difference(measure=measure, difference=paired_bootstrap(*values, rng), p_value=p_value)
+
+
+def matched(run: Run, reference: Run) -> np.ndarray:
+    """Return the reference's retained mass on the scenes and targets of a run [kg], in the order of `run.keys`.
+
+    Raises:
+        DatasetError: The reference lacks one of them.
+    """
+    missing = set(run.keys) - set(reference.keys)
+    if missing:
+        examples = ", ".join(str(key) for key in sorted(missing)[:3])
+        raise DatasetError(
+            f"the operator's run lacks {len(missing)} scenes and targets of {run.label} ({examples}, …); "
+            "make it longer with `lerobot-excav bench operator --scenes=…`"
+        )
+    require(len(reference.evaluations) == 1, "the operator's run must be a single evaluation")
+    return np.array([_mean(reference, key, "retained_mass_kg") for key in run.keys])

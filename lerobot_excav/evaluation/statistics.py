@@ -1,0 +1,169 @@
+"""Intervals and tests for rates and means of few episodes."""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+from lerobot_excav.errors import require
+
+CONFIDENCE = 0.95
+RESAMPLES = 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """An estimate with its confidence interval.
+
+    Attributes:
+        estimate: Best guess.
+        low: Lower end.
+        high: Upper end.
+    """
+
+    estimate: float
+    low: float
+    high: float
+
+
+def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -> Interval:
+    """Estimate a proportion with Wilson's score interval.
+
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212. Unlike the textbook interval it is right for few episodes and for
+    rates near 0 and 1.
+
+    Args:
+        successes: Number of successes.
+        n: Number of trials.
+        confidence: Coverage, in (0, 1).
+
+    Raises:
+        ConfigurationError: No trials, or successes outside [0, n].
+    """
+    require(n >= 1, f"n={n}: a proportion needs at least one episode")
+    require(0 <= successes <= n, f"successes={successes} is out of range; allowed: 0 to n={n}")
+    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+    p = successes / n
+    shrink = 1.0 + z * z / n
+    center = (p + z * z / (2 * n)) / shrink
+    half = z / shrink * math.sqrt(p * (1.0 - p) / n + z * z / (4 * n * n))
+    # The ends are exact at p = 0 and p = 1; rounding must not push them past it.
+    return Interval(estimate=p, low=min(p, max(0.0, center - half)), high=max(p, min(1.0, center + half)))
+
+
+def bootstrap_mean(
+    values: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Interval:
+    """Estimate a mean with a percentile bootstrap interval.
+
+    Args:
+        values: Independent values, shape (n,).
+        rng: Source of the resampling.
+        confidence: Coverage, in (0, 1).
+        resamples: Number of resamples.
+
+    Raises:
+        ConfigurationError: No values.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    require(values.size >= 1, "a mean needs at least one episode")
+    means = values[_resample(values.size, rng, resamples)].mean(axis=1)
+    return _percentiles(float(values.mean()), means, confidence)
+
+
+def bootstrap_ratio(
+    numerator: np.ndarray,
+    denominator: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Interval:
+    """Estimate the ratio of two means of paired values with a percentile bootstrap interval.
+
+    Args:
+        numerator: Values, shape (n,).
+        denominator: Values of the same scenes, shape (n,).
+        rng: Source of the resampling, which draws scenes.
+        confidence: Coverage, in (0, 1).
+        resamples: Number of resamples.
+
+    Raises:
+        ConfigurationError: Different lengths, no values, or a denominator without a positive mean.
+    """
+    numerator, denominator = (
+        np.asarray(numerator, dtype=np.float64),
+        np.asarray(denominator, dtype=np.float64),
+    )
+    require(
+        numerator.shape == denominator.shape,
+        f"a paired ratio needs as many values on both sides, not {numerator.size} and {denominator.size}",
+    )
+    require(denominator.size >= 1, "a ratio needs at least one episode")
+    require(float(denominator.mean()) > 0.0, "the operator's mean is zero, so nothing can be related to it")
+    rows = _resample(numerator.size, rng, resamples)
+    below = denominator[rows].mean(axis=1)
+    ratios = np.divide(numerator[rows].mean(axis=1), below, out=np.full(resamples, np.inf), where=below > 0.0)
+    return _percentiles(float(numerator.mean() / denominator.mean()), ratios, confidence)
+
+
+def paired_bootstrap(
+    first: np.ndarray,
+    second: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Interval:
+    """Estimate the mean difference `second - first` of paired values with a percentile bootstrap interval.
+
+    Args:
+        first: Values, shape (n,).
+        second: Values of the same scenes, shape (n,).
+        rng: Source of the resampling, which draws scenes.
+        confidence: Coverage, in (0, 1).
+        resamples: Number of resamples.
+
+    Raises:
+        ConfigurationError: Different lengths or no values.
+    """
+    first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    require(
+        first.shape == second.shape,
+        f"a paired difference needs as many values on both sides, not {first.size} and {second.size}",
+    )
+    return bootstrap_mean(second - first, rng, confidence=confidence, resamples=resamples)
+
+
+def mcnemar_exact(first_only: int, second_only: int) -> float:
+    """Test whether two success rates on the same scenes are equal.
+
+    The exact, two-sided form: the scenes on which only one of the two succeeds fall to either side like a fair coin
+    (Q. McNemar, Psychometrika 12 (1947) 153-157).
+
+    Args:
+        first_only: Scenes on which only the first succeeds.
+        second_only: Scenes on which only the second succeeds.
+
+    Returns:
+        p-value; 1 if they never differ.
+    """
+    require(first_only >= 0 and second_only >= 0, f"counts must not be negative: {first_only}, {second_only}")
+    n, k = first_only + second_only, min(first_only, second_only)
+    tail = sum(math.comb(n, i) for i in range(k + 1)) / 2**n
+    return min(1.0, 2.0 * tail)
+
+
+def _resample(n: int, rng: np.random.Generator, resamples: int) -> np.ndarray:
+    return rng.integers(0, n, size=(resamples, n))
+
+
+def _percentiles(estimate: float, resampled: np.ndarray, confidence: float) -> Interval:
+    tail = 50.0 * (1.0 - confidence)
+    low, high = np.percentile(resampled, [tail, 100.0 - tail])
+    return Interval(estimate=estimate, low=float(low), high=float(high))

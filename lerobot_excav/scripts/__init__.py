@@ -1,0 +1,1 @@
+"""The subcommands of `lerobot-excav`, one thin file each; `main` lists them."""

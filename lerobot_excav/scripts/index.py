@@ -1,0 +1,101 @@
+"""Rebuild the paired-scene index of a dataset and use it.
+
+The index (meta/excav_pairs.parquet, one row per episode) is derived from the dataset's own columns; rebuild it after
+every edit. With --select and --split it prints the flags that make stock lerobot-train use exactly those episodes.
+
+Examples:
+  lerobot-excav index outputs/paired
+      rebuild; list scenes with missing or duplicate targets
+  lerobot-excav index outputs/recorded --session=outputs/excavator_sessions/2026-01-31_10-00-00.jsonl
+      complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
+  lerobot-excav index outputs/paired --split=scene --eval-fraction=0.2
+      hold out a fifth of the scenes, with all their episodes
+  lerobot-train ... $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags)
+      train on one episode of each of 40 scenes
+"""
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+from lerobot_excav.datasets.pair_coverage import PairCoverage, pair_coverage
+from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
+from lerobot_excav.datasets.split import SPLIT_UNITS, Split, split
+from lerobot_excav.errors import require
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("dataset", type=Path, help="folder of the dataset")
+    parser.add_argument(
+        "--session", type=Path, help="session log of excavator_sim: add the excav.* columns first"
+    )
+    parser.add_argument(
+        "--out", type=Path, help="with --session: put the completed dataset here, keep the recording"
+    )
+    group = parser.add_argument_group("choosing episodes for lerobot-train")
+    group.add_argument("--select", choices=COMPOSITIONS, default="all", help="composition (default: all)")
+    group.add_argument("--episodes", type=int, help="how many episodes (default: as many as there are)")
+    group.add_argument("--scenes", type=int, help="how many scenes, for paired and non-paired")
+    group.add_argument("--include-failures", action="store_true", help="also choose episodes without success")
+    group.add_argument("--split", choices=SPLIT_UNITS, help="hold out whole scenes, or single episodes")
+    group.add_argument("--eval-fraction", type=float, default=0.2, help="part to hold out (default: 0.2)")
+    group.add_argument("--seed", type=int, default=0, help="seed of choice and split (default: 0)")
+    group.add_argument("--flags", action="store_true", help="print nothing but the flags, for $(...)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Complete, rebuild, choose, and say what came of it."""
+    from lerobot_excav.datasets.paired_index import INDEX_PATH, write_index
+
+    require(arguments.out is None or arguments.session is not None, "--out is of use with --session only")
+    root = arguments.dataset
+    if arguments.session is not None:
+        from lerobot_excav.datasets.resimulation import complete_recording
+
+        root = complete_recording(root, arguments.session, out=arguments.out)
+    index = write_index(root)
+    if not arguments.flags:
+        print(f"{root / INDEX_PATH}: {len(index)} episodes")
+        print("\n".join(describe(index, pair_coverage(index))))
+    if arguments.flags or arguments.split or arguments.select != "all":
+        _print_flags(arguments, root, index)
+    return 0
+
+
+def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
+    """Describe an index in a few lines."""
+    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
+    lines = [
+        f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
+        f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
+        f"retained mass: {index['retained_mass_kg'].mean():.0f} kg on average",
+    ]
+    lines += [f"missing: {scene} lacks target {targets}" for scene, targets in coverage.missing.items()]
+    lines += [f"duplicate: {uid} in episodes {episodes}" for uid, episodes in coverage.duplicates.items()]
+    return lines
+
+
+def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame) -> None:
+    rows = usable(index, include_failures=arguments.include_failures)
+    rows = select(
+        rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=arguments.seed
+    )
+    if arguments.split is None:
+        parts = Split(train=rows["episode_index"].tolist(), evaluation=[])
+    else:
+        parts = split(rows, arguments.split, eval_fraction=arguments.eval_fraction, seed=arguments.seed)
+    if parts.evaluation:
+        from lerobot_excav.datasets.episode_table import require_single_task
+
+        require_single_task(root, [*parts.train, *parts.evaluation])
+    if arguments.flags:
+        print(" ".join(parts.flags()))
+        return
+    print(f"\nchosen: {len(parts.train)} episodes to train on, {len(parts.evaluation)} held out")
+    print(
+        " \\\n  ".join(
+            ["lerobot-train ...", f"--dataset.root={root}", *(f"'{flag}'" for flag in parts.flags())]
+        )
+    )

@@ -1,0 +1,90 @@
+"""`lerobot-excav`: what LeRobot's own commands cannot express, on the same files."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from lerobot_excav.errors import ExcavError
+
+COMMANDS = {
+    "demos": "record demonstrations with the scripted operator, faster than real time",
+    "index": "rebuild the paired-scene index, complete a recording, print lerobot-train's episode flags",
+    "qc": "check a dataset and replay a sample of its episodes",
+    "report": "make the table of one or more evaluations, with intervals and comparisons",
+    "bench": "measure this machine, or the scripted operator on many scenes",
+}
+
+EPILOG = """\
+a first round:
+  lerobot-excav demos --scenes=50 --targets=4 --out=outputs/digging
+  lerobot-excav qc outputs/digging
+  lerobot-train --policy.type=mask_act --policy.push_to_hub=false --dataset.repo_id=local/digging \\
+      --dataset.root=outputs/digging --output_dir=outputs/train \\
+      $(lerobot-excav index outputs/digging --split=scene --flags)
+  lerobot-eval --policy.path=outputs/train/checkpoints/last/pretrained_model --env.type=excavator \\
+      --env.scene_set=test --env.metrics_path=outputs/metrics.jsonl --eval.n_episodes=40
+  lerobot-excav report outputs/metrics.jsonl
+
+`lerobot-excav COMMAND --help` explains a command.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a subcommand.
+
+    Args:
+        argv: Arguments; those of the process by default.
+
+    Returns:
+        Exit code: 0, 1 if a check failed, 2 after an error of usage or data, 130 after Ctrl-C.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or arguments[0] not in COMMANDS:
+        _overview().parse_args(arguments or ["--help"])
+        return 0
+    name, *rest = arguments
+    # Loaded only now, so that help is instant whatever the other commands need.
+    command = importlib.import_module(f"lerobot_excav.scripts.{name}")
+    try:
+        return int(command.run(command_parser(name, command).parse_args(rest)))
+    except ExcavError as error:
+        print(f"lerobot-excav {name}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"\nlerobot-excav {name}: interrupted", file=sys.stderr)
+        return 130
+
+
+def command_parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
+    """Build the argument parser of a subcommand.
+
+    Args:
+        name: Its name.
+        command: Its module, with `add_arguments` and a docstring that ends in examples.
+    """
+    parser = argparse.ArgumentParser(
+        prog=f"lerobot-excav {name}",
+        description=command.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_arguments(parser)
+    return parser
+
+
+def _overview() -> argparse.ArgumentParser:
+    commands = "\n".join(f"  {name:8} {summary}" for name, summary in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        prog="lerobot-excav",
+        usage="lerobot-excav COMMAND [options]",
+        description=f"{__doc__}\n\ncommands:\n{commands}",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("command", metavar="COMMAND", choices=list(COMMANDS), help=argparse.SUPPRESS)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,70 @@
+"""Make the table of one or more evaluations.
+
+RESULTS are metrics files (--env.metrics_path of lerobot-eval), or folders with a metrics.jsonl in them. LABEL=FILE
+names a run; files of one label are training seeds of one policy. With several runs, each is compared with the first,
+scene by scene.
+
+Examples:
+  lerobot-excav report outputs/metrics.jsonl
+  lerobot-excav report outputs/metrics.jsonl --operator=outputs/operator.jsonl --out=outputs/report
+      also relate the retained mass to the operator's (from `lerobot-excav bench operator`); write report.md, report.json
+  lerobot-excav report no_mask=a1.jsonl no_mask=a2.jsonl mask=b1.jsonl mask=b2.jsonl
+      two policies, two training seeds each
+"""
+
+import argparse
+from pathlib import Path
+
+from lerobot_excav.errors import require
+from lerobot_excav.evaluation.metrics import Run, read_evaluation
+from lerobot_excav.evaluation.report import make_report, write_report
+from lerobot_excav.evaluation.report_text import report_text
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("results", metavar="RESULTS", nargs="+", help="[LABEL=]FILE or folder")
+    parser.add_argument("--operator", type=Path, help="metrics file of an operator on the same scenes")
+    parser.add_argument("--out", type=Path, help="folder for report.md and report.json")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the bootstrap (default: 0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, report, write."""
+    operator = arguments.operator and Run(
+        label="operator", evaluations=(read_evaluation(arguments.operator),)
+    )
+    report = make_report(runs_from(arguments.results), operator=operator, seed=arguments.seed)
+    text = report_text(report)
+    print(text)
+    if arguments.out is not None:
+        write_report(report, text, arguments.out)
+        print(f"written: {arguments.out / 'report.md'}, {arguments.out / 'report.json'}")
+    return 0
+
+
+def runs_from(results: list[str]) -> list[Run]:
+    """Read runs in the order of their first mention.
+
+    Args:
+        results: `[LABEL=]PATH` each; without a label, the name of the file, or of its folder if that says more.
+
+    Raises:
+        ConfigurationError: One file was given twice.
+        DatasetError: A file cannot be used.
+    """
+    files: dict[str, list[Path]] = {}
+    for result in results:
+        label, separator, name = result.rpartition("=")
+        path = Path(name)
+        files.setdefault(label if separator else _default_label(path), []).append(path)
+    named = [path.resolve() for paths in files.values() for path in paths]
+    require(len(set(named)) == len(named), "RESULTS name a file twice; a file is one evaluation")
+    return [
+        Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths))
+        for label, paths in files.items()
+    ]
+
+
+def _default_label(path: Path) -> str:
+    return path.resolve().parent.name if path.stem == "metrics" else path.stem

@@ -1,0 +1,160 @@
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from lerobot.datasets import LeRobotDataset, merge_datasets, remove_feature
+
+from lerobot_excav.datasets import resimulation
+from lerobot_excav.datasets.paired_index import INDEX_PATH, read_index, write_index
+from lerobot_excav.datasets.resimulation import complete_recording
+from lerobot_excav.datasets.schema import excav_features
+from lerobot_excav.errors import DatasetError
+
+
+@pytest.fixture(scope="module")
+def recording(paired_dataset, tmp_path_factory):
+    """Make what `lerobot-record` leaves of a session: no excav columns, but a session log."""
+    folder = tmp_path_factory.mktemp("recorded")
+    dataset = LeRobotDataset("local/toy", root=paired_dataset, video_backend="pyav")
+    remove_feature(
+        dataset, list(excav_features()), output_dir=folder / "recording", repo_id="local/recording"
+    )
+    index = read_index(paired_dataset)
+    lines = [
+        {
+            "episode_index": int(row.episode_index),
+            "scene_set": row.scene_set,
+            "scene_id": int(row.scene_id),
+            "target_id": int(row.target_id),
+            "fps": 10,
+            "soil": "sand",
+            "observation_height": 32,
+            "observation_width": 48,
+            "task": "Scoop-v0",
+            "frames": int(row.length),
+            "restarts": [],
+        }
+        for row in index.itertuples()
+    ]
+    write_session(folder / "session.jsonl", lines)
+    return folder, lines
+
+
+def write_session(path, lines):
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path
+
+
+@pytest.fixture
+def session(recording, tmp_path):
+    """Write the session with some lines changed: `{episode_index: changes}`."""
+    _, lines = recording
+
+    def write(changes=None):
+        changed = [{**line, **(changes or {}).get(line["episode_index"], {})} for line in lines]
+        return write_session(tmp_path / "session.jsonl", changed)
+
+    return write
+
+
+def test_completing_a_recording_restores_what_the_simulation_knew(
+    recording, paired_dataset, toy_rig, tmp_path
+):
+    folder, _ = recording
+    out = complete_recording(
+        folder / "recording", folder / "session.jsonl", out=tmp_path / "c", rig=toy_rig()
+    )
+    pd.testing.assert_frame_equal(read_index(out), read_index(paired_dataset))
+    completed = LeRobotDataset("local/c", root=out, video_backend="pyav")
+    original = LeRobotDataset("local/o", root=paired_dataset, video_backend="pyav")
+    for frame in (0, 7, 100):
+        for key, value in original[frame].items():
+            np.testing.assert_array_equal(np.asarray(completed[frame][key]), np.asarray(value))
+
+
+def test_a_completed_recording_merges_with_scripted_demonstrations(
+    recording, paired_dataset, toy_rig, tmp_path
+):
+    folder, _ = recording
+    out = complete_recording(
+        folder / "recording", folder / "session.jsonl", out=tmp_path / "c", rig=toy_rig()
+    )
+    parts = [LeRobotDataset("local/x", root=root, video_backend="pyav") for root in (out, paired_dataset)]
+    merge_datasets(parts, "local/m", output_dir=tmp_path / "m")
+    index = write_index(tmp_path / "m")
+    assert index["pair_uid"].value_counts().tolist() == [2] * 19
+
+
+def test_completing_in_place_replaces_the_recording(recording, toy_rig, tmp_path):
+    folder, _ = recording
+    root = tmp_path / "recording"
+    shutil.copytree(folder / "recording", root)
+    assert complete_recording(root, folder / "session.jsonl", rig=toy_rig()) == root
+    assert len(read_index(root)) == 19
+    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+
+
+def test_the_later_of_two_lines_about_an_episode_counts(recording, toy_rig, tmp_path):
+    folder, lines = recording
+    session = write_session(tmp_path / "s.jsonl", [{**lines[0], "scene_id": 4}, *lines])
+    complete_recording(folder / "recording", session, out=tmp_path / "c", rig=toy_rig())
+    assert read_index(tmp_path / "c")["scene_id"][0] == 0
+
+
+def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
+    recording, session, toy_rig, tmp_path
+):
+    folder, _ = recording
+    with pytest.raises(DatasetError, match=r"episode 0: .* at frame 1 of 6 .*largest deviation 0\.0\d+"):
+        complete_recording(folder / "recording", session(), out=tmp_path / "c", rig=toy_rig(noise=0.1))
+    with pytest.raises(DatasetError, match=r"episode 2: .* at frame 0"):
+        complete_recording(
+            folder / "recording", session({2: {"scene_id": 4}}), out=tmp_path / "c", rig=toy_rig()
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["session.jsonl"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({1: {"fps": 5}}, "ran at 5 frames/s, the dataset has 10"),
+        ({1: {"restarts": [3]}}, r"episode 1 was restarted at frame \[3\]"),
+        ({1: {"episode_index": 99}}, r"no line for episodes \[1\]"),
+    ],
+)
+def test_a_session_that_does_not_fit_is_refused(recording, session, toy_rig, tmp_path, changes, message):
+    folder, _ = recording
+    with pytest.raises(DatasetError, match=message):
+        complete_recording(folder / "recording", session(changes), out=tmp_path / "c", rig=toy_rig())
+
+
+def test_a_failure_while_writing_leaves_the_recording_alone(recording, toy_rig, tmp_path, monkeypatch):
+    folder, _ = recording
+    root = tmp_path / "recording"
+    shutil.copytree(folder / "recording", root)
+    before = {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+    def fail(_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(resimulation, "write_index", fail)
+    with pytest.raises(OSError, match="disk full"):
+        complete_recording(root, folder / "session.jsonl", rig=toy_rig())
+    assert {path: path.read_bytes() for path in root.rglob("*") if path.is_file()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+
+
+def test_a_dataset_with_the_columns_is_not_completed_again(paired_dataset, session, toy_rig, tmp_path):
+    with pytest.raises(DatasetError, match="already"):
+        complete_recording(paired_dataset, session(), out=tmp_path / "c", rig=toy_rig())
+    assert (paired_dataset / INDEX_PATH).is_file()
+
+
+@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks fps")])
+def test_a_damaged_session_names_the_line(recording, toy_rig, tmp_path, text, message):
+    folder, _ = recording
+    (tmp_path / "s.jsonl").write_text(text)
+    with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
+        complete_recording(folder / "recording", tmp_path / "s.jsonl", out=tmp_path / "c", rig=toy_rig())
