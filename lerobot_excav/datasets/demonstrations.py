@@ -8,12 +8,9 @@ are assembled in the order of the settings, so neither the number of workers nor
 import shutil
 import time
 from concurrent.futures import Executor, Future
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from tqdm import tqdm
 
 from lerobot_excav.datasets.assembly import append_episode, create_dataset
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
@@ -21,10 +18,11 @@ from lerobot_excav.datasets.episode_store import EpisodeStore
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.partial_run import PartialRun
+from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.provenance import read_provenance, write_provenance
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig, play_demonstration
-from lerobot_excav.datasets.workers import worker_pool
-from lerobot_excav.errors import DatasetError, ExcavError
+from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.errors import DatasetError
 
 Outcome = dict[str, Any]
 
@@ -107,14 +105,11 @@ def _fill(
     """Simulate what is missing and assemble everything in order."""
     pairs = settings.pairs()
     dataset = create_dataset(partial.dataset, fps=settings.fps, height=settings.height, width=settings.width)
-    with worker_pool(workers) as pool, _progress_bar(len(pairs), show=show_progress) as bar:
-        futures = {pair: _start(pool, rig, settings, pair, partial.episodes) for pair in pairs}
-        progress = _Progress(bar)
-        for future in futures.values():
-            future.add_done_callback(progress.count)
+    with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:
+        futures = {pair: _start(pool, progress, rig, settings, pair, partial.episodes) for pair in pairs}
         outcomes = []
         for pair, future in futures.items():
-            outcome = _result(pair, future)
+            outcome = episode_result(pair, future)
             if outcome["kept"]:
                 append_episode(dataset, EpisodeStore(partial.episodes).read(pair))
             outcomes.append(outcome)
@@ -131,14 +126,21 @@ def _fill(
 
 
 def _start(
-    pool: Executor, rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path
+    pool: Executor,
+    progress: EpisodeProgress,
+    rig: Rig,
+    settings: DemonstrationSettings,
+    pair: Pair,
+    folder: Path,
 ) -> Future[Outcome]:
+    """Submit an episode, unless it is finished already."""
     finished = EpisodeStore(folder).outcome(pair)
-    if finished is None:
-        return pool.submit(simulate_episode, rig, settings, pair, folder)
-    future: Future[Outcome] = Future()
-    future.set_result(finished)
-    return future
+    if finished is not None:
+        progress.skip()
+        future: Future[Outcome] = Future()
+        future.set_result(finished)
+        return future
+    return submit_episode(pool, progress, simulate_episode, rig, settings, pair, folder)
 
 
 def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
@@ -155,45 +157,3 @@ def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, fold
     """
     episode = play_demonstration(rig, settings, pair)
     return EpisodeStore(folder).write(episode, keep_frames=episode.success or settings.keep_failures)
-
-
-def _result(pair: Pair, future: Future[Outcome]) -> Outcome:
-    try:
-        return future.result()
-    except BrokenProcessPool as error:
-        raise ExcavError(
-            "a worker process died (out of memory?); continue with --resume, perhaps with fewer --workers"
-        ) from error
-    except ExcavError as error:
-        raise ExcavError(f"{pair.uid}: {error}") from error
-
-
-def _progress_bar(total: int, *, show: bool) -> "tqdm[Any]":
-    return tqdm(
-        total=total,
-        disable=not show,
-        desc="episodes",
-        bar_format="{desc} {n_fmt}/{total_fmt} |{bar}| {elapsed}<{remaining}{postfix}",
-    )
-
-
-class _Progress:
-    """Counts finished episodes on a bar."""
-
-    def __init__(self, bar: "tqdm[Any]") -> None:
-        self._bar = bar
-        self._start = time.monotonic()
-        self._simulated = 0
-        self._failed = 0
-
-    def count(self, future: Future[Outcome]) -> None:
-        """Take in a finished episode."""
-        if future.cancelled() or future.exception() is not None:
-            return
-        minutes = (time.monotonic() - self._start) / 60.0
-        self._simulated += 1
-        self._failed += not future.result()["success"]
-        self._bar.set_postfix_str(
-            f"{self._simulated / max(minutes, 1e-6):.1f} episodes/min, {self._failed} failed", refresh=False
-        )
-        self._bar.update()

@@ -6,10 +6,13 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any
 
-from lerobot_excav.errors import require
+from lerobot_excav.datasets.pair import Pair
+from lerobot_excav.datasets.progress import EpisodeProgress
+from lerobot_excav.errors import ExcavError, require
 
 # Every worker is one simulation; libraries that start threads of their own would only fight over the cores.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS"), "1")
@@ -44,6 +47,43 @@ def worker_pool(workers: int) -> Iterator[Executor]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def submit_episode(
+    pool: Executor, progress: EpisodeProgress, play: Callable[..., dict[str, Any]], *arguments: Any
+) -> Future[dict[str, Any]]:
+    """Submit an episode to a pool, to be counted when it is done.
+
+    Args:
+        pool: Where it is played.
+        progress: Counts it.
+        play: Plays it and returns its outcome, which has an entry `success`.
+        arguments: Arguments of `play`.
+    """
+
+    def count(future: Future[dict[str, Any]]) -> None:
+        if not future.cancelled() and future.exception() is None:
+            progress.count(success=bool(future.result()["success"]))
+
+    future = pool.submit(play, *arguments)
+    future.add_done_callback(count)
+    return future
+
+
+def episode_result(pair: Pair, future: Future[dict[str, Any]]) -> dict[str, Any]:
+    """Wait for the outcome of an episode.
+
+    Raises:
+        ExcavError: A worker died, or the episode failed; the message names it.
+    """
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise ExcavError(
+            "a worker process died (out of memory?); go on with --resume, perhaps with fewer --workers"
+        ) from error
+    except ExcavError as error:
+        raise ExcavError(f"{pair.uid}: {error}") from error
 
 
 class InProcessExecutor(Executor):

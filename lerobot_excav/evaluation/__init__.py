@@ -1,1 +1,1 @@
-"""Evaluation: `metrics` reads what was measured, `statistics` gives intervals, `comparison` and `report` make tables."""
+"""Evaluation: `metrics` are read, `statistics` gives intervals, `comparison` and `report` make tables."""

@@ -130,7 +130,7 @@ def _by_key(records: Iterable[tuple[str, dict[str, Any]]]) -> dict[EpisodeKey, E
         episode = _episode(record, place)
         if episode.key in episodes:
             raise DatasetError(
-                f"{place}: scene and target {episode.key} occur twice; is it two evaluations in one file?"
+                f"{place}: scene and target {episode.key} occur twice; are these two evaluations?"
             )
         episodes[episode.key] = episode
     return episodes

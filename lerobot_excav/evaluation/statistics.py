@@ -30,8 +30,8 @@ class Interval:
 def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -> Interval:
     """Estimate a proportion with Wilson's score interval.
 
-    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212. Unlike the textbook interval it is right for few episodes and for
-    rates near 0 and 1.
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212. Unlike the textbook interval it is right for few episodes
+    and for rates near 0 and 1.
 
     Args:
         successes: Number of successes.

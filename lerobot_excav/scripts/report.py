@@ -7,7 +7,7 @@ scene by scene.
 Examples:
   lerobot-excav report outputs/metrics.jsonl
   lerobot-excav report outputs/metrics.jsonl --operator=outputs/operator.jsonl --out=outputs/report
-      also relate the retained mass to the operator's (from `lerobot-excav bench operator`); write report.md, report.json
+      also relate the retained mass to the operator's, from `lerobot-excav bench operator`; write report.md, report.json
   lerobot-excav report no_mask=a1.jsonl no_mask=a2.jsonl mask=b1.jsonl mask=b2.jsonl
       two policies, two training seeds each
 """

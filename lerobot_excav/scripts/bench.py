@@ -1,0 +1,94 @@
+"""Measure this machine, or let the scripted operator play many scenes.
+
+Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like that
+of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies.
+
+Examples:
+  lerobot-excav bench --quick --json=outputs/machine.json
+  lerobot-excav bench --only=soil,environment
+  lerobot-excav bench operator --scene-set=test --scenes=100 --metrics=outputs/operator.jsonl
+      100 test scenes with 4 targets each
+  lerobot-excav bench operator --first-scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
+      what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
+"""
+
+import argparse
+import json
+import os
+import platform
+from pathlib import Path
+
+from lerobot_excav.errors import require_choice
+from lerobot_excav.scripts.demonstration_arguments import DEFAULT_WORKERS, add_settings, settings_from
+
+MEASURES = ("soil", "environment", "writing", "demos", "policy")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
+    parser.add_argument(
+        "--only",
+        type=_names,
+        default=MEASURES,
+        help=f"what to time, out of {','.join(MEASURES)} (default: all)",
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=DEFAULT_WORKERS,
+        help=f"processes that record (default: {DEFAULT_WORKERS})",
+    )
+    parser.add_argument("--json", type=Path, help="also write the numbers to this file")
+    operator = parser.add_subparsers(dest="what", metavar="operator").add_parser(
+        "operator",
+        help="let the scripted operator play scenes, without pictures",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    operator.add_argument("--metrics", type=Path, required=True, help="metrics file to write; must not exist")
+    add_settings(operator, scene_set="test", scenes=100)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, and print what was measured."""
+    return _machine(arguments) if arguments.what is None else _operator(arguments)
+
+
+def _machine(arguments: argparse.Namespace) -> int:
+    from lerobot_excav.evaluation.speed import measures
+
+    tasks = measures(workers=arguments.workers)
+    print(
+        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, Python {platform.python_version()}"
+    )
+    results = []
+    for name in arguments.only:
+        for result in tasks[name](arguments.quick):
+            print(f"{result.name:42} {result.value:10.2f} {result.unit}", flush=True)
+            results.append(result.as_dict())
+    if arguments.json is not None:
+        arguments.json.parent.mkdir(parents=True, exist_ok=True)
+        machine = {"machine": platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
+        arguments.json.write_text(json.dumps({**machine, "measurements": results}, indent=1) + "\n")
+    return 0
+
+
+def _operator(arguments: argparse.Namespace) -> int:
+    from lerobot_excav.evaluation.metrics import Run, read_evaluation
+    from lerobot_excav.evaluation.operator_run import evaluate_operator
+    from lerobot_excav.evaluation.report import make_report
+    from lerobot_excav.evaluation.report_text import report_text
+
+    evaluate_operator(settings_from(arguments), arguments.metrics, workers=arguments.workers)
+    operator = Run(label="operator", evaluations=(read_evaluation(arguments.metrics),))
+    print(report_text(make_report([operator])))
+    print(f"written: {arguments.metrics}")
+    return 0
+
+
+def _names(text: str) -> list[str]:
+    names = text.split(",")
+    for name in names:
+        require_choice("--only", name, MEASURES)
+    return names
