@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 _STRIPS_PER_PART = 8
 _BISECTIONS = 40
 
+_NARROW_M = 1e-6
+"""Narrower strips, between corners one above the other, give no point of the drawn surface."""
+
 _U, _FLOOR, _ROOF, _LIMIT, _HEAPS, _WIDTH = range(6)
 
 
@@ -229,7 +232,7 @@ class Capacity:
         roof = strips[:, _ROOF]
         heap = np.minimum(top - roof, 0.5 * self._slope_tan * self.geometry.inner_width_m)
         top = np.where((strips[:, _HEAPS] > 0) & (heap > 0), roof + heap, np.minimum(top, roof))
-        holds = (roof > strips[:, _FLOOR]) & (top > strips[:, _FLOOR]) & (strips[:, _WIDTH] > 0)
+        holds = (roof > strips[:, _FLOOR]) & (top > strips[:, _FLOOR]) & (strips[:, _WIDTH] > _NARROW_M)
         return self._to_tool(np.stack([strips[holds, _U], top[holds]], axis=1), pitch_rad)
 
     @staticmethod

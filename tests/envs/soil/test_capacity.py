@@ -99,3 +99,13 @@ def test_the_centre_of_mass_moves_without_a_jump_while_a_load_runs_out() -> None
 
 def test_a_load_on_its_way_out_is_still_drawn() -> None:
     assert len(Capacity(BUCKET, SLOPE).load(0.2, -math.pi / 2).surface_t) > 1
+
+
+@given(
+    pitch=st.floats(-3.6, -0.1), share=st.floats(0.05, 1.5), support=st.sampled_from([0.0, 1e-9, 0.4, 1.0])
+)
+@settings(max_examples=40, deadline=None)
+def test_no_two_points_of_the_drawn_surface_coincide(pitch: float, share: float, support: float) -> None:
+    surface = Capacity(BUCKET, SLOPE).load(share * BUCKET.struck_volume_m3, pitch, support).surface_t
+    assert np.isfinite(surface).all()
+    assert np.linalg.norm(np.diff(surface, axis=0), axis=1).min(initial=1.0) > 1e-7
