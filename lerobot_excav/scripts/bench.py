@@ -1,7 +1,7 @@
 """Measure this machine, or let the scripted operator play many scenes.
 
-Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like that
-of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies.
+Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like
+that of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies.
 
 Examples:
   lerobot-excav bench --quick --json=outputs/machine.json
@@ -29,8 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
     parser.add_argument(
         "--only",
-        type=_names,
-        default=MEASURES,
+        default=",".join(MEASURES),
         help=f"what to time, out of {','.join(MEASURES)} (default: all)",
     )
     parser.add_argument(
@@ -58,12 +57,13 @@ def run(arguments: argparse.Namespace) -> int:
 def _machine(arguments: argparse.Namespace) -> int:
     from lerobot_excav.evaluation.speed import measures
 
+    names = arguments.only.split(",")
+    for name in names:
+        require_choice("--only", name, MEASURES)
     tasks = measures(workers=arguments.workers)
-    print(
-        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, Python {platform.python_version()}"
-    )
+    print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     results = []
-    for name in arguments.only:
+    for name in names:
         for result in tasks[name](arguments.quick):
             print(f"{result.name:42} {result.value:10.2f} {result.unit}", flush=True)
             results.append(result.as_dict())
@@ -85,10 +85,3 @@ def _operator(arguments: argparse.Namespace) -> int:
     print(report_text(make_report([operator])))
     print(f"written: {arguments.metrics}")
     return 0
-
-
-def _names(text: str) -> list[str]:
-    names = text.split(",")
-    for name in names:
-        require_choice("--only", name, MEASURES)
-    return names

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.errors import DatasetError
+from lerobot_excav.evaluation.comparison import compare, matched
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+def test_differences_are_paired_by_scene_and_target(make_run, metrics_line, rng):
+    first = make_run(
+        "a", [metrics_line(i, target_success=i < 2, retained_mass_kg=100.0 * i) for i in range(8)]
+    )
+    # The same scenes in another order, each 7 kg better.
+    second = make_run(
+        "b", [metrics_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))]
+    )
+    target, full, mass = compare(first, second, rng)
+    assert target.difference.estimate == pytest.approx(0.75)
+    assert target.p_value == pytest.approx(2 / 2**6)
+    assert full.p_value == 1.0
+    assert (mass.difference.low, mass.difference.high) == pytest.approx((7.0, 7.0))
+    assert mass.p_value is None
+
+
+def test_several_seeds_have_no_mcnemar_test(make_run, metrics_line, rng):
+    first = make_run("a", [metrics_line(1)], [metrics_line(1)])
+    second = make_run("b", [metrics_line(1)], [metrics_line(1, target_success=False)])
+    target, *_ = compare(first, second, rng)
+    assert target.p_value is None
+    assert target.difference.estimate == -0.5
+
+
+def test_runs_on_other_scenes_are_not_compared(make_run, metrics_line, rng):
+    with pytest.raises(DatasetError, match=r"a and b differ in 2 scenes and targets \(test/1/1, test/2/2"):
+        compare(make_run("a", [metrics_line(1)]), make_run("b", [metrics_line(2)]), rng)
+
+
+def test_the_operator_may_have_played_more_scenes_but_not_fewer(make_run, metrics_line):
+    operator = make_run("o", [metrics_line(i, retained_mass_kg=float(i)) for i in range(1, 5)])
+    assert matched(make_run("a", [metrics_line(3), metrics_line(2)]), operator).tolist() == [2.0, 3.0]
+    with pytest.raises(DatasetError, match="lacks 1 scenes"):
+        matched(make_run("b", [metrics_line(9)]), operator)

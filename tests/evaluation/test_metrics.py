@@ -1,0 +1,85 @@
+import pytest
+
+from lerobot_excav.envs.metrics_log import MetricsLog
+from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.evaluation.metrics import EpisodeKey, read_evaluation
+
+
+def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, metrics_line):
+    evaluation = read_evaluation(
+        metrics_file("m.jsonl", [metrics_line(3), metrics_line(4, retained_mass_kg=20)])
+    )
+    assert list(evaluation.episodes) == [EpisodeKey("test", 3, 3), EpisodeKey("test", 4, 0)]
+    assert evaluation.episodes[EpisodeKey("test", 4, 0)].retained_mass_kg == 20.0
+    assert evaluation.operator is None
+
+
+def test_what_the_environment_logs_is_read(tmp_path, metrics_line):
+    log = MetricsLog(tmp_path / "m.jsonl", n_envs=1)
+    log.begin_batch([1000])
+    log.common.update(fps=10)
+    metrics = {
+        k: v
+        for k, v in metrics_line(1000).items()
+        if k not in ("episode_ix", "seed", "scene_id", "target_id")
+    }
+    log.finish_episode(0, {"is_success": True, "scene_id": 1000, "target_id": 0, "episode_metrics": metrics})
+    assert list(read_evaluation(tmp_path / "m.jsonl").episodes) == [EpisodeKey("test", 1000, 0)]
+
+
+def test_a_folder_stands_for_the_metrics_file_in_it(metrics_file, metrics_line, tmp_path):
+    metrics_file("metrics.jsonl", [metrics_line(3)])
+    assert read_evaluation(tmp_path).path == tmp_path / "metrics.jsonl"
+
+
+def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, metrics_line):
+    first = [metrics_line(i, retained_mass_kg=1.0) for i in range(3)]
+    second = [metrics_line(i, retained_mass_kg=2.0) for i in range(2)]
+    evaluation = read_evaluation(metrics_file("m.jsonl", first + second))
+    assert (evaluation.number, evaluation.of) == (2, 2)
+    assert [episode.retained_mass_kg for episode in evaluation.episodes.values()] == [2.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"retained_mass_kg": None}, "retained_mass_kg=None is no float"),
+        ({"target_success": 1}, "target_success=1 is no bool"),
+        ({"scene_id": True}, "scene_id=True is no int"),
+        ({"task": "Clear-v0"}, "task='Clear-v0'"),
+        ({"scene_id": 1, "target_id": 1}, "test/1/1 occur twice"),
+    ],
+)
+def test_a_line_that_cannot_be_used_is_named(metrics_file, metrics_line, changes, message):
+    path = metrics_file("m.jsonl", [metrics_line(1), metrics_line(2, **changes)])
+    with pytest.raises(DatasetError, match=rf"m\.jsonl:2.*{message}"):
+        read_evaluation(path)
+
+
+def test_a_missing_field_is_named(metrics_file, metrics_line):
+    incomplete = metrics_line(1)
+    del incomplete["spill_before_target_events"]
+    with pytest.raises(DatasetError, match=r"m\.jsonl:1: lacks spill_before_target_events"):
+        read_evaluation(metrics_file("m.jsonl", [incomplete]))
+
+
+@pytest.mark.parametrize(("text", "message"), [("", "empty"), ("{", "not JSON"), ("3", "a JSON object")])
+def test_a_damaged_file_is_refused(tmp_path, text, message):
+    (tmp_path / "m.jsonl").write_text(text)
+    with pytest.raises(DatasetError, match=message):
+        read_evaluation(tmp_path / "m.jsonl")
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(DatasetError, match=r"--env\.metrics_path"):
+        read_evaluation(tmp_path / "m.jsonl")
+
+
+def test_seeds_of_a_run_must_show_the_same_scenes(make_run, metrics_line):
+    with pytest.raises(ConfigurationError, match="other scenes or targets"):
+        make_run("a", [metrics_line(1)], [metrics_line(2)])
+
+
+def test_a_run_does_not_mix_mask_conditions(make_run, metrics_line):
+    with pytest.raises(ConfigurationError, match="mixes mask conditions"):
+        make_run("a", [metrics_line(1), metrics_line(2, mask_condition="zero")])

@@ -1,0 +1,66 @@
+import json
+
+import pytest
+
+from lerobot_excav.evaluation.report import make_report, write_report
+from lerobot_excav.evaluation.report_text import report_text
+
+
+@pytest.fixture
+def runs(make_run, metrics_line):
+    half = make_run(
+        "half", [metrics_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)]
+    )
+    full = make_run("full", *[[metrics_line(i, retained_mass_kg=280.0) for i in range(10)]] * 2)
+    return [half, full]
+
+
+@pytest.fixture
+def operator(make_run, metrics_line):
+    return make_run(
+        "operator", [metrics_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)]
+    )
+
+
+def test_rates_count_episodes_and_masses_count_scenes(runs):
+    half, full = make_report(runs).runs
+    assert (half.target_success.estimate, half.episodes, half.seeds, half.scenes) == (0.5, 10, 1, 10)
+    assert (full.target_success.estimate, full.episodes, full.seeds, full.scenes) == (1.0, 20, 2, 10)
+    assert full.retained_mass_kg.estimate == 280.0
+    assert half.efficiency is None
+
+
+def test_efficiency_relates_to_the_operator_on_the_same_scenes(runs, operator):
+    report = make_report(runs, operator=operator)
+    assert [run.label for run in report.runs] == ["half", "full", "operator"]
+    assert [run.efficiency.estimate for run in report.runs] == pytest.approx([0.375, 0.7, 1.0])
+    assert report.operator == "scripted"
+
+
+def test_the_text_shows_every_number_with_its_interval(runs, operator):
+    text = report_text(make_report(runs, operator=operator))
+    assert "50.0 [23.7, 76.3]" in text  # Wilson, 5 of 10
+    assert "37.5 [37.5, 37.5]" in text
+    assert "## full - half" in text
+    assert "+130.0 [+130.0, +130.0]" in text
+    assert "operator: scripted" in text
+
+
+def test_a_file_with_several_evaluations_is_noted(make_run, metrics_line):
+    run = make_run("a", [metrics_line(0), metrics_line(0)])
+    assert "holds 2 evaluations; the last one is used" in report_text(make_report([run]))
+
+
+def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, metrics_line):
+    run = make_run("a", [metrics_line(i, retained_mass_kg=37.0 * i % 11) for i in range(10)])
+    first, second = (make_report([run], seed=seed) for seed in (0, 5))
+    assert first.runs[0].retained_mass_kg != second.runs[0].retained_mass_kg
+    assert "seed 5" in report_text(second)
+
+
+def test_the_report_is_written_as_markdown_and_json(runs, tmp_path):
+    report = make_report(runs)
+    write_report(report, report_text(report), tmp_path / "new" / "folder")
+    written = json.loads((tmp_path / "new" / "folder" / "report.json").read_text())
+    assert written["runs"][0]["target_success"]["estimate"] == 0.5
+    assert (tmp_path / "new" / "folder" / "report.md").read_text() == report_text(report)

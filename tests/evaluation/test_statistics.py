@@ -1,0 +1,119 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.statistics import (
+    bootstrap_mean,
+    bootstrap_ratio,
+    mcnemar_exact,
+    paired_bootstrap,
+    wilson_interval,
+)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+@pytest.mark.parametrize(
+    ("successes", "n", "low", "high"),
+    [
+        # R. G. Newcombe, Statistics in Medicine 17 (1998) 857-872, table I, method 3.
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ],
+)
+def test_wilson_interval_reproduces_published_values(successes, n, low, high):
+    interval = wilson_interval(successes, n)
+    assert interval.estimate == successes / n
+    assert interval.low == pytest.approx(low, abs=5e-5)
+    assert interval.high == pytest.approx(high, abs=5e-5)
+
+
+@given(n=st.integers(1, 400), share=st.floats(0, 1))
+def test_wilson_interval_holds_the_estimate_and_mirrors(n, share):
+    k = round(n * share)
+    interval, mirrored = wilson_interval(k, n), wilson_interval(n - k, n)
+    assert 0.0 <= interval.low <= interval.estimate <= interval.high <= 1.0
+    assert interval.low == pytest.approx(1.0 - mirrored.high)
+
+
+@given(n=st.integers(1, 200))
+def test_more_episodes_narrow_the_interval(n):
+    few, many = wilson_interval(n, 2 * n), wilson_interval(4 * n, 8 * n)
+    assert many.high - many.low < few.high - few.low
+
+
+def test_more_confidence_widens_the_interval():
+    assert wilson_interval(5, 10, confidence=0.99).high > wilson_interval(5, 10, confidence=0.9).high
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "p"), [(0, 0, 1.0), (0, 5, 0.0625), (1, 9, 0.021484375), (5, 5, 1.0)]
+)
+def test_mcnemar_is_the_two_sided_binomial_test(first, second, p):
+    assert mcnemar_exact(first, second) == pytest.approx(p)
+    assert mcnemar_exact(second, first) == mcnemar_exact(first, second)
+
+
+def test_bootstrap_of_a_mean_agrees_with_the_normal_interval_for_many_values(rng):
+    values = rng.normal(10.0, 2.0, 2000)
+    interval = bootstrap_mean(values, rng)
+    half = 1.96 * values.std() / math.sqrt(values.size)
+    assert interval.estimate == pytest.approx(values.mean())
+    # The ends of 10 000 resamples scatter by a few percent of the half width.
+    assert interval.low == pytest.approx(values.mean() - half, abs=0.1 * half)
+    assert interval.high == pytest.approx(values.mean() + half, abs=0.1 * half)
+
+
+def test_the_same_seed_gives_the_same_interval():
+    values = np.arange(10.0) ** 1.5
+    first, second = (bootstrap_mean(values, np.random.default_rng(3)) for _ in range(2))
+    assert first == second
+    assert first != bootstrap_mean(values, np.random.default_rng(4))
+
+
+def test_more_confidence_widens_the_bootstrap_interval(rng):
+    values = np.arange(10.0)
+    assert bootstrap_mean(values, rng, confidence=0.5).low > bootstrap_mean(values, rng, confidence=0.99).low
+
+
+def test_equal_values_have_no_spread(rng):
+    interval = bootstrap_mean(np.full(7, 3.0), rng)
+    assert (interval.low, interval.estimate, interval.high) == (3.0, 3.0, 3.0)
+
+
+def test_a_ratio_of_proportional_values_is_exact(rng):
+    reference = np.array([100.0, 200.0, 400.0])
+    interval = bootstrap_ratio(0.8 * reference, reference, rng)
+    assert (interval.low, interval.estimate, interval.high) == pytest.approx((0.8, 0.8, 0.8))
+
+
+def test_pairing_removes_the_spread_between_scenes(rng):
+    scenes = rng.normal(300.0, 100.0, 50)
+    interval = paired_bootstrap(scenes, scenes + 5.0, rng)
+    assert (interval.low, interval.estimate, interval.high) == pytest.approx((5.0, 5.0, 5.0))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda rng: wilson_interval(0, 0),
+        lambda rng: wilson_interval(3, 2),
+        lambda rng: bootstrap_mean(np.array([]), rng),
+        lambda rng: bootstrap_ratio(np.ones(2), np.ones(3), rng),
+        lambda rng: bootstrap_ratio(np.ones(2), np.zeros(2), rng),
+        lambda rng: paired_bootstrap(np.ones(2), np.ones(3), rng),
+        lambda rng: mcnemar_exact(-1, 2),
+    ],
+)
+def test_impossible_inputs_are_refused(call, rng):
+    with pytest.raises(ConfigurationError):
+        call(rng)
