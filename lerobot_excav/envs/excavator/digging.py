@@ -47,6 +47,9 @@ class DiggingResistance:
 
     Args:
         model: The compiled machine.
+
+    Attributes:
+        scale: Share of the wrench that acts in the current substep, in [0, 1].
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -55,17 +58,27 @@ class DiggingResistance:
         self._added_inertia = const.SUBSTEP_S * np.array(const.SERVO_DAMPING_NMS_RAD)
         self._torque_limit = np.array(const.JOINT_TORQUE_NM)
         self._units = np.eye(model.nv)
-        self._force: NDArray[np.float64] = np.zeros(3)
-        self._torque: NDArray[np.float64] = np.zeros(3)
-        self._size_n = 0.0
         self._jacobian = np.zeros((6, model.nv))
         self._mass_matrix = np.zeros((model.nv, model.nv))
+        self._force: NDArray[np.float64]
+        self._torque: NDArray[np.float64]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the reactions of the past."""
+        self._force, self._torque = np.zeros(3), np.zeros(3)
+        self._size_n = 0.0
         self.scale = 0.0
 
     def set_reaction(self, reaction: Reaction) -> None:
-        """Take the wrench about the tool origin that holds for the coming tick."""
-        self._force = np.asarray(reaction.force_w_n, dtype=np.float64)
-        self._torque = np.asarray(reaction.torque_w_nm, dtype=np.float64)
+        """Take the wrench about the tool origin that holds for the coming tick.
+
+        It is blended with the one before: the soil's answer depends on the direction in which the edge moves, which
+        its own last answer has changed. No resistance takes effect at once.
+        """
+        share = const.RESISTANCE_BLEND if np.any(reaction.force_w_n) or np.any(reaction.torque_w_nm) else 1.0
+        self._force = share * reaction.force_w_n + (1.0 - share) * self._force
+        self._torque = share * reaction.torque_w_nm + (1.0 - share) * self._torque
         # The lever turns a wrench that is mostly torque into a speed of the same meaning.
         lever_force = float(np.linalg.norm(self._torque)) / const.BUCKET_LENGTH_M
         self._size_n = max(float(np.linalg.norm(self._force)), lever_force)

@@ -77,6 +77,7 @@ class ExcavatorMachine:
         self.data.qpos[:] = joint_pos
         self.data.ctrl[:] = joint_pos
         self._payload.reset()
+        self._resistance.reset()
         self._control.reset(joint_pos)
         self._box_contact_force_n = 0.0
         mujoco.mj_forward(self.model, self.data)

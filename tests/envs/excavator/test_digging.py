@@ -101,7 +101,8 @@ def test_wrench_is_that_of_the_reaction_about_the_tool_origin(machine):
         machine.tick(ARM_IN, edge_reaction(machine, [0.0, 0.0, 0.0]))
     resistance = DiggingResistance(machine.model)
     reaction = edge_reaction(machine, [1e3, 0.0, 0.0])
-    resistance.set_reaction(reaction)
+    for _ in range(60):  # until the blend has settled
+        resistance.set_reaction(reaction)
     resistance.apply(machine.data)
     bucket = machine.model.body("bucket").id
     wrench = machine.data.xfrc_applied[bucket]
@@ -110,6 +111,32 @@ def test_wrench_is_that_of_the_reaction_about_the_tool_origin(machine):
     origin_to_com = machine.data.xipos[bucket] - machine.data.xpos[bucket]
     about_origin = wrench[3:] + np.cross(origin_to_com, wrench[:3])
     np.testing.assert_allclose(about_origin, resistance.scale * reaction.torque_w_nm, atol=1e-6)
+
+
+def test_reactions_are_blended_over_two_ticks_and_end_at_once(machine):
+    machine.reset(REACHED_OUT)
+    resistance = DiggingResistance(machine.model)
+    acting = []
+    for force in (1e3, 1e3, 3e3, 0.0):
+        resistance.set_reaction(edge_reaction(machine, [force, 0.0, 0.0]))
+        acting.append(resistance._force[0])
+    assert acting == pytest.approx([500.0, 750.0, 1875.0, 0.0])
+    resistance.set_reaction(edge_reaction(machine, [1e3, 0.0, 0.0]))
+    resistance.reset()
+    assert not resistance._force.any()
+
+
+def test_blend_calms_a_bucket_whose_resistance_flips_every_tick(machine, monkeypatch):
+    def shaking(blend):
+        monkeypatch.setattr(const, "RESISTANCE_BLEND", blend)
+        machine.reset(REACHED_OUT)
+        speeds = []
+        for i in range(120):
+            machine.tick(ARM_IN, edge_reaction(machine, [6e4 if i % 2 else 1.5e4, 0.0, 0.0]))
+            speeds.append(machine.joint_vel[2])
+        return np.abs(np.diff(speeds[60:])).max()
+
+    assert shaking(0.5) < 0.7 * shaking(1.0)
 
 
 def test_wrench_is_gone_in_the_tick_after_the_reaction(machine):
