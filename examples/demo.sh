@@ -16,7 +16,7 @@ say "1/3  Recording $((SCENES * 4)) paired demonstrations -> $OUT/dataset"
 say "2/3  Training mask_act for $STEPS steps -> $OUT/train"
 [ -d "$OUT/train/checkpoints/last" ] || {
   rm -rf "$OUT/train"
-  lerobot-train --policy.type=mask_act --policy.network=fast --policy.device=cpu --policy.push_to_hub=false \
+  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.device=cpu --policy.push_to_hub=false \
     --dataset.repo_id=local/excavator_demo --dataset.root="$OUT/dataset" --output_dir="$OUT/train" \
     --steps="$STEPS" --batch_size=16 --num_workers=0 --log_freq=50 --save_freq="$STEPS" --env_eval_freq=0 --wandb.enable=false
 }

@@ -1,0 +1,37 @@
+"""Draw the picture of the README: the excavator at work, with the commanded dig region tinted.
+
+Usage: python examples/picture.py docs/images/dig.png [SCENE_ID TARGET_ID]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from lerobot_excav.envs.excavator.env import ExcavatorEnv
+from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.excavator.targets import target_mask_img
+
+TINT_RGB = np.array([235, 60, 40])
+
+
+def main(path: Path, scene_id: int, target_id: int) -> None:
+    """Play one cycle until the bucket comes up full, and save the main view beside the cab's."""
+    env = ExcavatorEnv(scene_set="train", observation_height=480, observation_width=640)
+    env.reset(options={"scene_id": scene_id, "target_id": target_id})
+    operator = ScriptedOperator(rng=np.random.default_rng(0))
+    operator.reset(env)
+    while operator.phase != "carry":
+        observation, *_ = env.step(operator.act(env))
+    main_view, cab_view = observation["pixels"]["main"], observation["pixels"]["cab"]
+    region = target_mask_img(env.target, env.renderer.terrain_points_w(env.worksite.soil))[..., 0] > 0
+    main_view[region] = (0.45 * main_view[region] + 0.55 * TINT_RGB).astype(np.uint8)
+    env.close()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.concatenate([main_view, cab_view], axis=1)).save(path, optimize=True)
+
+
+if __name__ == "__main__":
+    numbers = [int(word) for word in sys.argv[2:4]] or [3, 2]
+    main(Path(sys.argv[1]), *numbers)
