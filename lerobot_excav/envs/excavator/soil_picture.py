@@ -15,7 +15,7 @@ _HIDDEN_M = -0.03
 _LEAST_BOX_SOIL_M = 0.005
 _LOAD_SKIN_M = 0.03
 _STRAIGHT_RAD = 0.1
-_WHITE = np.eye(3).ravel()
+_UPRIGHT = np.eye(3).ravel()
 
 
 class SoilPicture:
@@ -52,14 +52,12 @@ class SoilPicture:
 
     def add_moving_soil(self, scene: mujoco.MjvScene, soil: Soil) -> None:
         """Append the load in the bucket and the flying parcels to a scene."""
-        rgb = surfaces.GRAIN_BRIGHTNESS * self._model.mat_rgba[self._soil_material, :3]
-        rgba = np.append(rgb, 1.0).astype(np.float32)
-        self._add_load(scene, soil, rgba)
+        self._add_load(scene, soil)
         size = np.full(3, soil.parcel_radius_m)
         for position in soil.parcel_positions_w[: scene.maxgeom - scene.ngeom]:
-            _add_geom(scene, mujoco.mjtGeom.mjGEOM_SPHERE, size, position, _WHITE, rgba)
+            self._add_geom(scene, mujoco.mjtGeom.mjGEOM_SPHERE, size, position, _UPRIGHT)
 
-    def _add_load(self, scene: mujoco.MjvScene, soil: Soil, rgba: NDArray[np.float32]) -> None:
+    def _add_load(self, scene: mujoco.MjvScene, soil: Soil) -> None:
         """Append one slab below every straight piece of the load's free surface, as wide as the bucket."""
         surface = _corners(np.asarray(soil.payload_surface_t))
         tool = self._machine.tool()
@@ -75,14 +73,31 @@ class SoilPicture:
                 into_load = -into_load
             center_t = np.array([middle[0], 0.0, middle[1]]) + half_thickness * into_load
             axes_t = np.column_stack([along, np.cross(into_load, along), into_load])
-            _add_geom(
+            self._add_geom(
                 scene,
                 mujoco.mjtGeom.mjGEOM_BOX,
                 np.array([0.5 * length, half_width, half_thickness]),
                 tool.position_w + tool.rotation_w @ center_t,
                 (tool.rotation_w @ axes_t).ravel(),
-                rgba,
             )
+
+    def _add_geom(
+        self,
+        scene: mujoco.MjvScene,
+        kind: Any,
+        size: NDArray[np.float64],
+        position_w: NDArray[np.float64],
+        rotation_w: NDArray[np.float64],
+    ) -> None:
+        """Append one body of soil, unless the scene is full."""
+        if scene.ngeom >= scene.maxgeom:
+            return
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(
+            geom, kind, size, position_w, rotation_w, self._model.mat_rgba[self._soil_material]
+        )
+        geom.matid = self._soil_material
+        scene.ngeom += 1
 
     def _write(self, skin: str, vertices: NDArray[np.float32]) -> None:
         index = self._model.skin(skin).id
@@ -112,17 +127,3 @@ def _resampled(heights: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[
         for n, cells in zip(shape, heights.shape, strict=True)
     )
     return heights[np.ix_(rows, columns)]
-
-
-def _add_geom(
-    scene: mujoco.MjvScene,
-    kind: Any,
-    size: NDArray[np.float64],
-    position_w: NDArray[np.float64],
-    rotation_w: NDArray[np.float64],
-    rgba: NDArray[np.float32],
-) -> None:
-    if scene.ngeom >= scene.maxgeom:
-        return
-    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], kind, size, position_w, rotation_w, rgba)
-    scene.ngeom += 1

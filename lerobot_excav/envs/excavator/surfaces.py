@@ -16,9 +16,6 @@ BOX_SOIL_SKIN = "box_soil"
 _TERRAIN_SPACING_M = 0.1
 _BOX_SOIL_SPACING_M = 0.2
 _SKIRT_DEPTH_M = 0.05
-GRAIN_BRIGHTNESS = 0.88
-"""Mean brightness of the soil's texture; what is drawn without texture is dimmed by as much."""
-
 _TEXTURE_PIXELS = 128
 _TEXTURE_PERIOD_M = 2.0
 _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
@@ -106,7 +103,7 @@ def _add_soil_material(spec: mujoco.MjSpec) -> None:
     noise = rng.standard_normal((_TEXTURE_PIXELS, _TEXTURE_PIXELS))
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(_TEXTURE_PIXELS)] * 2))
     grain = np.fft.ifft2(np.fft.fft2(noise) / (1.0 + (12.0 * frequency) ** 2) ** 0.5).real
-    brightness = np.clip(255.0 * GRAIN_BRIGHTNESS + 22.0 * grain / grain.std(), 120.0, 255.0).astype(np.uint8)
+    brightness = np.clip(225.0 + 22.0 * grain / grain.std(), 120.0, 255.0).astype(np.uint8)
     texture = spec.add_texture(name="grain", type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3)
     texture.width = texture.height = _TEXTURE_PIXELS
     texture.data = np.repeat(brightness[..., None], 3, axis=2).tobytes()

@@ -98,3 +98,11 @@ def test_cab_camera_turns_with_the_house(model):
 
 def test_a_diverged_state_is_not_silently_reset(model):
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def test_tracks_and_dozer_blade_stop_the_bucket(model):
+    carrier = colliding(model, "undercarriage")
+    assert len(carrier) == 3
+    for geom in carrier:
+        assert model.geom_contype[geom] & SURROUNDINGS_BIT
+        assert model.geom_conaffinity[geom] & WORKING_BIT

@@ -2,6 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.excavator.appearance import Appearance
 from lerobot_excav.envs.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.excavator.soil_picture import SoilPicture
@@ -96,6 +97,13 @@ def test_bent_surface_gets_one_slab_per_straight_piece(machine, picture):
     x = np.linspace(1.1, 0.3, 81)
     ridge = np.stack([x, -0.3 + np.abs(x - 0.7)], axis=1)
     assert len(drawn(machine, picture, LoadedSoil(ridge))) == 2
+
+
+def test_moving_soil_has_the_colour_and_the_grain_of_the_terrain(machine, picture):
+    machine.set_appearance(Appearance(soil_rgb=(0.4, 0.3, 0.2)))
+    pieces = drawn(machine, picture, LoadedSoil([(1.0, 0.1), (0.4, 0.1)], [(0.0, 0.0, 1.0)]))
+    assert [p.matid for p in pieces] == [machine.model.material("soil").id] * 2
+    np.testing.assert_allclose([p.rgba[:3] for p in pieces], [[0.4, 0.3, 0.2]] * 2, atol=1e-6)
 
 
 def test_every_parcel_is_a_sphere_in_its_place(machine, picture):
