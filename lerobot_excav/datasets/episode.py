@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import CAMERAS
@@ -20,7 +21,7 @@ class Environment(Protocol):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode."""
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[Any]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Advance by one frame."""
 
     def close(self) -> None:
@@ -33,7 +34,7 @@ class Operator(Protocol):
     def reset(self, env: Any) -> None:
         """Look at a freshly reset environment."""
 
-    def act(self, env: Any) -> np.ndarray:
+    def act(self, env: Any) -> NDArray[Any]:
         """Return the next action, float32 (4,)."""
 
 
@@ -54,10 +55,10 @@ class Episode:
 
     pair: Pair
     task: str
-    images: dict[str, np.ndarray]
-    state: np.ndarray
-    action: np.ndarray
-    task_state: np.ndarray
+    images: dict[str, NDArray[Any]]
+    state: NDArray[Any]
+    action: NDArray[Any]
+    task_state: NDArray[Any]
     success: bool
     metrics: dict[str, Any]
 
@@ -78,7 +79,7 @@ def demonstrate(env: Environment, operator: Operator, pair: Pair) -> Episode:
     return _play(env, pair, reset=lambda: operator.reset(env), act=lambda _: operator.act(env))
 
 
-def replay(env: Environment, action: np.ndarray, pair: Pair) -> Episode:
+def replay(env: Environment, action: NDArray[Any], pair: Pair) -> Episode:
     """Play recorded actions again, all of them: a person may go on after the environment says that it is over.
 
     Args:
@@ -97,14 +98,15 @@ def _play(
     pair: Pair,
     *,
     reset: Callable[[], None],
-    act: Callable[[int], np.ndarray],
+    act: Callable[[int], NDArray[Any]],
     length: int | None = None,
 ) -> Episode:
     """Play `length` frames, or by default until the episode ends."""
     observation, info = env.reset(options={"scene_id": pair.scene_id, "target_id": pair.target_id})
     reset()
     frames: list[dict[str, Any]] = []
-    success, metrics, ended = False, {}, False
+    metrics: dict[str, Any] = {}
+    success, ended = False, False
     while (not ended) if length is None else len(frames) < length:
         action = np.asarray(act(len(frames)), dtype=np.float32)
         frames.append(_frame(observation, info, action))
@@ -123,7 +125,7 @@ def _play(
     )
 
 
-def _frame(observation: dict[str, Any], info: dict[str, Any], action: np.ndarray) -> dict[str, Any]:
+def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any]) -> dict[str, Any]:
     return {
         **observation.get("pixels", {}),
         "state": np.asarray(observation["agent_pos"], dtype=np.float32),

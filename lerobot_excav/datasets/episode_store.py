@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from lerobot_excav.datasets.episode import Episode
@@ -50,7 +51,7 @@ class EpisodeStore:
         }
         if keep_frames:
             buffer = io.BytesIO()
-            np.savez(buffer, **_arrays(episode), task=np.array(episode.task))
+            np.savez(buffer, allow_pickle=False, **_arrays(episode))
             _replace(self._path(episode.pair, "npz"), buffer.getbuffer())
         _replace(self._path(episode.pair, "json"), json.dumps(outcome).encode())
         return outcome
@@ -83,14 +84,19 @@ class EpisodeStore:
         return self._folder / f"{pair.uid.replace('/', '-')}.{suffix}"
 
 
-def _arrays(episode: Episode) -> dict[str, np.ndarray]:
-    arrays = {"state": episode.state, "action": episode.action, "task_state": episode.task_state}
+def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
+    arrays = {
+        "task": np.array(episode.task),
+        "state": episode.state,
+        "action": episode.action,
+        "task_state": episode.task_state,
+    }
     for camera, frames in episode.images.items():
         arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
     return arrays
 
 
-def _encode(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Compress images (n, H, W, 3) into one run of bytes and the end of each within it."""
     buffer = io.BytesIO()
     ends = []
@@ -100,7 +106,7 @@ def _encode(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.frombuffer(buffer.getvalue(), dtype=np.uint8), np.array(ends, dtype=np.int64)
 
 
-def _decode(data: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def _decode(data: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
     starts = np.concatenate([[0], ends[:-1]])
     return np.stack(
         [np.asarray(Image.open(io.BytesIO(data[a:b].tobytes()))) for a, b in zip(starts, ends, strict=True)]

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 from PIL import Image
 
 from lerobot_excav.datasets.pair import Pair
@@ -45,22 +46,22 @@ class EpisodeTable:
     length: int
     columns: dict[str, pa.ChunkedArray]
 
-    def array(self, key: str) -> np.ndarray:
+    def array(self, key: str) -> NDArray[Any]:
         """Return a numeric column, shape (n, k) or (n,)."""
         return np.stack(self.columns[key].to_numpy())
 
     @property
-    def state(self) -> np.ndarray:
+    def state(self) -> NDArray[Any]:
         """Joint positions and velocities, (n, 8)."""
         return self.array(STATE_KEY)
 
     @property
-    def action(self) -> np.ndarray:
+    def action(self) -> NDArray[Any]:
         """Joystick commands, (n, 4)."""
         return self.array(ACTION_KEY)
 
     @property
-    def task_state(self) -> np.ndarray:
+    def task_state(self) -> NDArray[Any]:
         """Task state, (n, 8)."""
         return self.array(TASK_STATE_KEY)
 
@@ -92,7 +93,7 @@ class EpisodeTable:
         }
         return EpisodeTable(index=self.index, length=1, columns=first)
 
-    def image(self, key: str, frame: int) -> np.ndarray:
+    def image(self, key: str, frame: int) -> NDArray[Any]:
         """Return a decoded picture, (H, W, 3) uint8."""
         return np.asarray(Image.open(io.BytesIO(self.columns[key][frame]["bytes"].as_py())).convert("RGB"))
 

@@ -39,12 +39,11 @@ def pair_coverage(index: pd.DataFrame) -> PairCoverage:
         Counts, missing targets and duplicates.
     """
     targets = set(index["target_id"])
-    scenes = index.groupby(SCENE_COLUMNS)["target_id"].agg(set)
-    missing = {
-        "/".join(str(part) for part in scene): sorted(targets - shown)
-        for scene, shown in scenes.items()
-        if shown != targets
+    scenes = {
+        f"{env}/{scene_set}/{scene_id}": set(rows["target_id"])
+        for (env, scene_set, scene_id), rows in index.groupby(SCENE_COLUMNS)
     }
+    missing = {scene: sorted(targets - shown) for scene, shown in scenes.items() if shown != targets}
     repeated = index[index.duplicated("pair_uid", keep=False)].groupby("pair_uid")["episode_index"]
     return PairCoverage(
         scenes=len(scenes),

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.schema import (
@@ -88,7 +89,7 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
     }
 
 
-def _mask_summary(mask_img: np.ndarray) -> dict[str, float]:
+def _mask_summary(mask_img: NDArray[Any]) -> dict[str, float]:
     """Return area and centroid of a mask (H, W, 3); the centroid of an empty mask is NaN."""
     rows, columns = np.nonzero(mask_img[..., 0] > 127)
     empty = rows.size == 0

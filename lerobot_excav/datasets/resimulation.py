@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from lerobot.datasets import LeRobotDataset, add_features
+from numpy.typing import NDArray
 
 from lerobot_excav.datasets.episode import Episode, replay
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
@@ -119,8 +120,9 @@ def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> Non
     def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
         return lambda row, episode, frame: values[int(episode)], excav_features()[key]
 
-    def task_state(row: dict[str, Any], episode: int, frame: int) -> np.ndarray:
-        return episodes[int(episode)].task_state[int(frame)]
+    def task_state(row: dict[str, Any], episode: int, frame: int) -> NDArray[Any]:
+        values: NDArray[Any] = episodes[int(episode)].task_state[int(frame)]
+        return values
 
     features = {
         SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),

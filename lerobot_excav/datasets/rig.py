@@ -12,7 +12,9 @@ from lerobot_excav.datasets.pair import Pair
 
 
 class Rig(Protocol):
-    """Makes environments and operators; hashable, and picklable if workers use it."""
+    """Makes environments and operators; picklable if workers use it."""
+
+    def __hash__(self) -> int: ...
 
     def environment(self, settings: DemonstrationSettings) -> Environment:
         """Make an environment."""

@@ -1,8 +1,10 @@
 """Two runs on the same scenes and targets, compared pair by pair."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.evaluation.metrics import EpisodeKey, Run
@@ -54,7 +56,7 @@ def require_same_keys(first: Run, second: Run) -> None:
         )
 
 
-def means_by_key(run: Run, measure: str) -> np.ndarray:
+def means_by_key(run: Run, measure: str) -> NDArray[Any]:
     """Return a measure per scene and target, averaged over seeds, in the order of `run.keys`."""
     return np.array([_mean(run, key, measure) for key in run.keys])
 
@@ -74,7 +76,7 @@ def _difference(measure: str, first: Run, second: Run, rng: np.random.Generator)
     return Difference(measure=measure, difference=paired_bootstrap(*values, rng), p_value=p_value)
 
 
-def matched(run: Run, reference: Run) -> np.ndarray:
+def matched(run: Run, reference: Run) -> NDArray[Any]:
     """Return the reference's retained mass on the scenes and targets of a run [kg], in the order of `run.keys`.
 
     Raises:

@@ -3,8 +3,10 @@
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.errors import require
 
@@ -53,7 +55,7 @@ def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -
 
 
 def bootstrap_mean(
-    values: np.ndarray,
+    values: NDArray[Any],
     rng: np.random.Generator,
     *,
     confidence: float = CONFIDENCE,
@@ -77,8 +79,8 @@ def bootstrap_mean(
 
 
 def bootstrap_ratio(
-    numerator: np.ndarray,
-    denominator: np.ndarray,
+    numerator: NDArray[Any],
+    denominator: NDArray[Any],
     rng: np.random.Generator,
     *,
     confidence: float = CONFIDENCE,
@@ -113,8 +115,8 @@ def bootstrap_ratio(
 
 
 def paired_bootstrap(
-    first: np.ndarray,
-    second: np.ndarray,
+    first: NDArray[Any],
+    second: NDArray[Any],
     rng: np.random.Generator,
     *,
     confidence: float = CONFIDENCE,
@@ -155,15 +157,15 @@ def mcnemar_exact(first_only: int, second_only: int) -> float:
     """
     require(first_only >= 0 and second_only >= 0, f"counts must not be negative: {first_only}, {second_only}")
     n, k = first_only + second_only, min(first_only, second_only)
-    tail = sum(math.comb(n, i) for i in range(k + 1)) / 2**n
+    tail: float = sum(math.comb(n, i) for i in range(k + 1)) / 2**n
     return min(1.0, 2.0 * tail)
 
 
-def _resample(n: int, rng: np.random.Generator, resamples: int) -> np.ndarray:
+def _resample(n: int, rng: np.random.Generator, resamples: int) -> NDArray[Any]:
     return rng.integers(0, n, size=(resamples, n))
 
 
-def _percentiles(estimate: float, resampled: np.ndarray, confidence: float) -> Interval:
+def _percentiles(estimate: float, resampled: NDArray[Any], confidence: float) -> Interval:
     tail = 50.0 * (1.0 - confidence)
     low, high = np.percentile(resampled, [tail, 100.0 - tail])
     return Interval(estimate=estimate, low=float(low), high=float(high))

@@ -59,9 +59,15 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.flags:
         print(f"{root / INDEX_PATH}: {len(index)} episodes")
         print("\n".join(describe(index, pair_coverage(index))))
-    if arguments.flags or arguments.split or arguments.select != "all":
+    if _asks_for_episodes(arguments):
         _print_flags(arguments, root, index)
     return 0
+
+
+def _asks_for_episodes(arguments: argparse.Namespace) -> bool:
+    counts = arguments.episodes is not None or arguments.scenes is not None
+    asked = arguments.flags or arguments.split or arguments.include_failures
+    return bool(counts or asked or arguments.select != "all")
 
 
 def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
