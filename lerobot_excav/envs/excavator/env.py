@@ -4,18 +4,20 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.control import checked_action
 from lerobot_excav.envs.excavator.cycle import DigCycle
 from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import Scene, draw_scene
-from lerobot_excav.envs.excavator.targets import TARGET_COUNT, Target, target_mask_img
+from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
 from lerobot_excav.envs.settings import (
     MASK_CONDITIONS,
     SCENE_SETS,
     SOILS,
+    TARGETS_PER_SCENE,
     TICKS_PER_SECOND,
     require_fps,
     require_image_size,
@@ -30,7 +32,7 @@ TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dum
 FULL_BUCKET_KG = 485.0
 
 
-class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
+class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     """An 8-t excavator in front of a pile, with a box to its left.
 
     Task (`Scoop-v0`): one dig-load-dump cycle on the region that the target mask shows.
@@ -177,7 +179,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
             self._mask_img = self._draw_mask(scene, target_id)
         return self._observe(), self._info()
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[Any]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Advance by one frame (1/fps s); see the class for action, reward and termination.
 
         Raises:
@@ -201,13 +203,13 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
             info["episode_metrics"] = self._episode_metrics()
         return self._observe(), float(reward), terminated, truncated, info
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return the main view (H, W, 3) uint8, or None without a render mode."""
         if self.render_mode is None:
             return None
         return self.renderer.render("main", self.worksite.soil)
 
-    def depth_m(self) -> np.ndarray:
+    def depth_m(self) -> NDArray[np.float32]:
         """Return the depth image registered with `main` [m along the optical axis], shape (H, W), float32."""
         return self.renderer.depth("main", self.worksite.soil)
 
@@ -221,11 +223,11 @@ class ExcavatorEnv(gym.Env[dict[str, Any], np.ndarray]):
         """Choose scene and target from options, else seed, else by chance."""
         number = int(self.np_random.integers(2**31)) if seed is None else seed
         scene_id = int(options.get("scene_id", number))
-        target_id = int(options.get("target_id", number % TARGET_COUNT))
-        require_choice("target_id", target_id, range(TARGET_COUNT))
+        target_id = int(options.get("target_id", number % TARGETS_PER_SCENE))
+        require_choice("target_id", target_id, range(TARGETS_PER_SCENE))
         return scene_id, target_id
 
-    def _draw_mask(self, scene: Scene, target_id: int) -> np.ndarray:
+    def _draw_mask(self, scene: Scene, target_id: int) -> NDArray[np.uint8]:
         points_w = self.renderer.terrain_points_w(self.worksite.soil)
         masks = [target_mask_img(target, points_w) for target in scene.targets]
         return conditioned_mask(masks, target_id, self.mask_condition, self.np_random)

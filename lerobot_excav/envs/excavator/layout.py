@@ -1,6 +1,7 @@
 """Where things stand on the worksite: machine, dig area and target box (world frame, see docs/conventions.md)."""
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from lerobot_excav.envs.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.soil import Container
@@ -9,11 +10,13 @@ DIG_AREA_EXTENT_M = (6.0, 6.0)
 """Size of the soil grid along x and y [m], centred on the world origin."""
 
 # 80 degrees to the left at the radius of the pile: a swing of usual length for loading a truck (kind: design).
-TARGET_BOX = Container(center_w=(-3.75, 4.75, 0.0), half_extent_m=(1.1, 1.1), wall_height_m=1.0, yaw_rad=0.0)
+TARGET_BOX = Container(
+    center_w=np.array([-3.75, 4.75, 0.0]), half_extent_m=np.array([1.1, 1.1]), wall_height_m=1.0, yaw_rad=0.0
+)
 """The box that receives the soil."""
 
 
-def cylinder_from_world(point_w: np.ndarray) -> tuple[float, float, float]:
+def cylinder_from_world(point_w: NDArray[np.float64]) -> tuple[float, float, float]:
     """Express a world point in the machine's cylinder coordinates.
 
     Args:
@@ -26,8 +29,8 @@ def cylinder_from_world(point_w: np.ndarray) -> tuple[float, float, float]:
     return float(np.hypot(dx, dy)), float(np.arctan2(dy, dx)), float(point_w[2])
 
 
-def world_from_cylinder(radius_m: np.ndarray, swing_rad: np.ndarray) -> np.ndarray:
+def world_from_cylinder(radius_m: ArrayLike, swing_rad: ArrayLike) -> NDArray[np.float64]:
     """Return the ground-plane points (..., 2) [m] at given radii and swing angles of the machine."""
     radius, swing = np.broadcast_arrays(radius_m, swing_rad)
     offset = np.stack([radius * np.cos(swing), radius * np.sin(swing)], axis=-1)
-    return offset + np.asarray(MACHINE_POS_W[:2])
+    return np.asarray(offset + np.asarray(MACHINE_POS_W[:2]))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.errors import ExcavError
 
@@ -10,8 +11,8 @@ _SHIFT_TRIES = 1000
 
 
 def conditioned_mask(
-    masks: Sequence[np.ndarray], target_id: int, condition: str, rng: np.random.Generator
-) -> np.ndarray:
+    masks: Sequence[NDArray[np.uint8]], target_id: int, condition: str, rng: np.random.Generator
+) -> NDArray[np.uint8]:
     """Return the mask that is shown under a condition.
 
     Args:
@@ -34,7 +35,7 @@ def conditioned_mask(
     return masks[target_id].copy()
 
 
-def _moved_elsewhere(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _moved_elsewhere(mask: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
     """Shift a blob inside the picture so that it does not overlap its old place."""
     rows, cols = np.nonzero(mask[..., 0])
     height, width = mask.shape[:2]

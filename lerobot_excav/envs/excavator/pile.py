@@ -1,6 +1,7 @@
 """Random piles of soil, shaped like what a truck or a loader leaves behind: overlapping heaps at rest."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil import relax
 
@@ -16,11 +17,11 @@ BORDER_M = 0.3
 def draw_pile(
     rng: np.random.Generator,
     *,
-    x_w: np.ndarray,
-    y_w: np.ndarray,
+    x_w: NDArray[np.float64],
+    y_w: NDArray[np.float64],
     repose_tan: float,
     density_kg_m3: float,
-) -> np.ndarray:
+) -> NDArray[np.float64]:
     """Draw one pile at rest on the floor.
 
     Args:
@@ -41,7 +42,9 @@ def draw_pile(
     return relax(heights, cell_size_m, repose_tan)
 
 
-def _heaps(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray, repose_tan: float) -> np.ndarray:
+def _heaps(
+    rng: np.random.Generator, x_w: NDArray[np.float64], y_w: NDArray[np.float64], repose_tan: float
+) -> NDArray[np.float64]:
     """Upper envelope of two to four cones a little flatter than repose, shape (nx, ny) [m]."""
     count = int(rng.integers(2, 5))
     # Spread across the pile rather than drawn one by one, so that no scene is a single narrow cone.
@@ -50,10 +53,12 @@ def _heaps(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray, repose_ta
     peak = rng.uniform(0.75, 1.1, count)
     slope = repose_tan * rng.uniform(0.7, 0.95, count)
     distance = np.hypot(x_w[:, None, None] - x_heap, y_w[None, :, None] - y_heap)
-    return np.max(peak - slope * distance, axis=2)
+    return np.asarray(np.max(peak - slope * distance, axis=2))
 
 
-def _ripples(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray) -> np.ndarray:
+def _ripples(
+    rng: np.random.Generator, x_w: NDArray[np.float64], y_w: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Low waves of a few centimetres, shape (nx, ny) [m]."""
     waves = np.zeros((x_w.size, y_w.size))
     for _ in range(6):
@@ -64,14 +69,16 @@ def _ripples(rng: np.random.Generator, x_w: np.ndarray, y_w: np.ndarray) -> np.n
     return waves
 
 
-def _roof(x_w: np.ndarray, y_w: np.ndarray, repose_tan: float) -> np.ndarray:
+def _roof(x_w: NDArray[np.float64], y_w: NDArray[np.float64], repose_tan: float) -> NDArray[np.float64]:
     """Height above which a pile would slide off the soil grid, shape (nx, ny) [m]; zero near the border."""
     inset_x = x_w.max() - BORDER_M - np.abs(x_w)
     inset_y = y_w.max() - BORDER_M - np.abs(y_w)
     return np.asarray(np.maximum(0.0, 0.9 * repose_tan * np.minimum(inset_x[:, None], inset_y[None, :])))
 
 
-def _fill_to_volume(shape: np.ndarray, roof: np.ndarray, column_sum_m: float) -> np.ndarray:
+def _fill_to_volume(
+    shape: NDArray[np.float64], roof: NDArray[np.float64], column_sum_m: float
+) -> NDArray[np.float64]:
     """Raise or lower the shape until what stands above the floor has the wanted volume (bisection on the level)."""
     low, high = -float(shape.max()), column_sum_m
     for _ in range(80):

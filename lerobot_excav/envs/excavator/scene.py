@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.appearance import Appearance, draw_appearance
 from lerobot_excav.envs.excavator.kinematics import inverse
@@ -37,17 +38,17 @@ class Scene:
     scene_set: str
     scene_id: int
     soil: str
-    heights_m: np.ndarray
-    joint_pos: np.ndarray
+    heights_m: NDArray[np.float64]
+    joint_pos: NDArray[np.float64]
     appearance: Appearance
     targets: tuple[Target, ...]
 
 
-def cell_centres_w() -> tuple[np.ndarray, np.ndarray]:
+def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the soil's cell centres along x and y [m], shapes (nx,) and (ny,), world frame."""
     counts = [round(extent / SOIL_CELL_SIZE_M) for extent in DIG_AREA_EXTENT_M]
-    x_w, y_w = ((np.arange(n) + 0.5) * SOIL_CELL_SIZE_M - 0.5 * n * SOIL_CELL_SIZE_M for n in counts)
-    return x_w, y_w
+    x_w, y_w = (SOIL_CELL_SIZE_M * (np.arange(n, dtype=np.float64) + 0.5 - 0.5 * n) for n in counts)
+    return np.asarray(x_w), np.asarray(y_w)
 
 
 def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
@@ -82,7 +83,9 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
     )
 
 
-def _draw_pile_with_targets(rng: np.random.Generator, soil: str) -> tuple[np.ndarray, tuple[Target, ...]]:
+def _draw_pile_with_targets(
+    rng: np.random.Generator, soil: str
+) -> tuple[NDArray[np.float64], tuple[Target, ...]]:
     """Draw piles until one offers all its targets."""
     x_w, y_w = cell_centres_w()
     parameters = PRESETS[soil]
@@ -99,7 +102,7 @@ def _draw_pile_with_targets(rng: np.random.Generator, soil: str) -> tuple[np.nda
     )
 
 
-def _draw_joint_pos(rng: np.random.Generator) -> np.ndarray:
+def _draw_joint_pos(rng: np.random.Generator) -> NDArray[np.float64]:
     """Draw a pose between pile and box, bucket raised: where the previous cycle would have left the machine."""
     while True:
         joint_pos = inverse(

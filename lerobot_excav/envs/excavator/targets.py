@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.layout import cylinder_from_world, world_from_cylinder
+from lerobot_excav.envs.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import ExcavError
 
-TARGET_COUNT = 4
 PATCH_SIZE_M = 0.8
 """Edge of the square patch on the ground plane [m] (design: about 0.8 m x 0.8 m)."""
 
@@ -35,11 +36,11 @@ class Target:
         size_m: Edge length [m].
     """
 
-    center_w: np.ndarray
+    center_w: NDArray[np.float64]
     yaw_rad: float
     size_m: float = PATCH_SIZE_M
 
-    def contains(self, points_w: np.ndarray) -> np.ndarray:
+    def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points lie above, on or below the patch.
 
         Args:
@@ -56,12 +57,12 @@ class Target:
 
 
 def find_targets(
-    heights_m: np.ndarray,
-    x_w: np.ndarray,
-    y_w: np.ndarray,
+    heights_m: NDArray[np.float64],
+    x_w: NDArray[np.float64],
+    y_w: NDArray[np.float64],
     rng: np.random.Generator,
     *,
-    count: int = TARGET_COUNT,
+    count: int = TARGETS_PER_SCENE,
 ) -> tuple[Target, ...]:
     """Pick dig regions that are reachable, hold enough soil and lie apart from each other.
 
@@ -93,7 +94,7 @@ def find_targets(
     )
 
 
-def target_mask_img(target: Target, terrain_points_w: np.ndarray) -> np.ndarray:
+def target_mask_img(target: Target, terrain_points_w: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Draw the mask of a target: the pixels whose soil surface point lies in the patch.
 
     Args:
@@ -111,7 +112,9 @@ def _ground_distance(a: Target, b: Target) -> float:
     return float(np.hypot(*(a.center_w[:2] - b.center_w[:2])))
 
 
-def _feasible_targets(heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray) -> list[Target]:
+def _feasible_targets(
+    heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
+) -> list[Target]:
     """Every feasible region on a 10 cm raster of the dig area."""
     step = max(1, round(0.1 / float(x_w[1] - x_w[0])))
     feasible = []
@@ -129,16 +132,22 @@ def _feasible_targets(heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray) -
     return feasible
 
 
-def _has_enough_soil(target: Target, heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray) -> bool:
-    patch = _sample(heights_m, x_w, y_w, target, np.array([-0.4, 0.4]))
-    dig_path = _sample(heights_m, x_w, y_w, target, np.array([-DIG_LENGTH_M, 0.1]))
+def _has_enough_soil(
+    target: Target, heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
+) -> bool:
+    patch = _sample(heights_m, x_w, y_w, target, (-0.4, 0.4))
+    dig_path = _sample(heights_m, x_w, y_w, target, (-DIG_LENGTH_M, 0.1))
     diggable_m3 = np.minimum(dig_path, DIG_DEPTH_M).mean() * DIG_WIDTH_M * (DIG_LENGTH_M + 0.1)
     return bool(patch.mean() >= LEAST_MEAN_HEIGHT_M and diggable_m3 >= LEAST_DIGGABLE_M3)
 
 
 def _sample(
-    heights_m: np.ndarray, x_w: np.ndarray, y_w: np.ndarray, target: Target, along_range_m: np.ndarray
-) -> np.ndarray:
+    heights_m: NDArray[np.float64],
+    x_w: NDArray[np.float64],
+    y_w: NDArray[np.float64],
+    target: Target,
+    along_range_m: tuple[float, float],
+) -> NDArray[np.float64]:
     """Heights at the nearest cells of a strip of bucket width along the dig direction [m], shape (12, 5)."""
     radius, swing, _ = cylinder_from_world(target.center_w)
     along = radius + np.linspace(*along_range_m, 12)

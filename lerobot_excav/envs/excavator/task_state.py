@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 from lerobot_excav.envs.excavator.targets import Target
@@ -41,7 +42,7 @@ class TaskState:
     bucket_depth_below_dig_plane_m: float = 0.0
     spill_before_target_events: int = 0
 
-    def as_array(self) -> np.ndarray:
+    def as_array(self) -> NDArray[np.float32]:
         """Return the values in the order of `TASK_STATE_NAMES`, shape (8,), float32."""
         return np.array([getattr(self, name) for name in TASK_STATE_NAMES], dtype=np.float32)
 
@@ -109,7 +110,7 @@ class TaskMeter:
         self.state.bucket_depth_below_dig_plane_m = depth_below_dig_plane_m(self._worksite.tool)
 
 
-def distance_to_box_m(point_w: np.ndarray) -> float:
+def distance_to_box_m(point_w: NDArray[np.float64]) -> float:
     """Return the distance from a point to the box with its walls [m]; zero inside or above-floor within the walls."""
     above = max(0.0, point_w[2] - TARGET_BOX.center_w[2] - TARGET_BOX.wall_height_m)
     return float(np.hypot(_horizontal_distance_to_box(point_w), above))
@@ -136,13 +137,13 @@ def depth_below_dig_plane_m(tool: Tool) -> float:
     return float(np.max(depth * _smoothstep(inset / FOOTPRINT_FADE_M)))
 
 
-def _smoothstep(x: np.ndarray) -> np.ndarray:
+def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rise smoothly from 0 at -1 to 1 at +1."""
     t = np.clip(0.5 * (x + 1.0), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def _horizontal_distance_to_box(point_w: np.ndarray) -> float:
+def _horizontal_distance_to_box(point_w: NDArray[np.float64]) -> float:
     """Distance on the ground plane from a point to the box's footprint [m], zero above it."""
     offset = np.asarray(point_w[:2]) - np.asarray(TARGET_BOX.center_w[:2])
     cos, sin = np.cos(TARGET_BOX.yaw_rad), np.sin(TARGET_BOX.yaw_rad)

@@ -1,6 +1,7 @@
 """The worksite: machine, soil and target box, advanced together one tick at a time."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.constants import TICK_S
 from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
@@ -31,7 +32,7 @@ class Worksite:
         self.soil.reset(scene.heights_m)
         self._ticks, self.time_s = 0, 0.0
 
-    def tick(self, action: np.ndarray) -> Reaction:
+    def tick(self, action: NDArray[np.float64]) -> Reaction:
         """Advance by `TICK_S` under joystick commands.
 
         Args:

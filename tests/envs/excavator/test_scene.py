@@ -4,8 +4,8 @@ import pytest
 from lerobot_excav.envs.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.excavator.pile import PILE_MASS_RANGE_KG
 from lerobot_excav.envs.excavator.scene import SOIL_CELL_SIZE_M, cell_centres_w, draw_scene
-from lerobot_excav.envs.excavator.targets import LEAST_DISTANCE_M, RADIUS_RANGE_M, TARGET_COUNT
-from lerobot_excav.envs.settings import SCENE_SETS, SOILS
+from lerobot_excav.envs.excavator.targets import LEAST_DISTANCE_M, RADIUS_RANGE_M
+from lerobot_excav.envs.settings import SCENE_SETS, SOILS, TARGETS_PER_SCENE
 from lerobot_excav.envs.soil import PRESETS
 from lerobot_excav.errors import ConfigurationError
 
@@ -46,7 +46,7 @@ def test_pile_keeps_off_the_border_of_the_dig_area(scene):
 
 
 def test_targets_are_four_reachable_and_apart(scene):
-    assert len(scene.targets) == TARGET_COUNT
+    assert len(scene.targets) == TARGETS_PER_SCENE
     for i, target in enumerate(scene.targets):
         assert RADIUS_RANGE_M[0] <= cylinder_from_world(target.center_w)[0] <= RADIUS_RANGE_M[1]
         for other in scene.targets[:i]:

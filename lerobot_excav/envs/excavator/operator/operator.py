@@ -3,6 +3,7 @@
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.constants import JOINT_SPEED_RAD_S
 from lerobot_excav.envs.excavator.cycle import LOADING_ONSET_KG, DigCycle
@@ -70,7 +71,7 @@ class ScriptedOperator:
         """Whether the cycle is over and the operator rests."""
         return self.phase == "rest"
 
-    def act(self, env: OperatedEnvironment) -> np.ndarray:
+    def act(self, env: OperatedEnvironment) -> NDArray[np.float32]:
         """Return the joystick command for the next frame.
 
         Args:
@@ -91,7 +92,8 @@ class ScriptedOperator:
         _, wanted_vel = self._motion.at(self._time_s + 0.5 / env.fps)
         self._time_s += 1.0 / env.fps
         rate = wanted_vel + (wanted_pos - joint_pos) / TRACKING_TIME_S
-        return np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0).astype(np.float32)
+        command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
+        return np.asarray(command, dtype=np.float32)
 
     def _begin(self, phase: int, env: OperatedEnvironment) -> None:
         """Start a phase from where the machine is, after the style's pause."""
@@ -101,7 +103,7 @@ class ScriptedOperator:
             joint_pos = env.worksite.machine.joint_pos
             self._motion = JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
 
-    def _joint_path(self, joint_pos: np.ndarray) -> list[np.ndarray]:
+    def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Plan the present phase's path from a joint position."""
         present = _bucket_pose(joint_pos)
         if self.phase == "reach":
@@ -116,7 +118,7 @@ class ScriptedOperator:
         }
         return [joint_pos, *(joint_pos_near(pose, keep="pin") for pose in plans[self.phase]()[1:])]
 
-    def _phase_is_over(self, joint_pos: np.ndarray, env: OperatedEnvironment) -> bool:
+    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: OperatedEnvironment) -> bool:
         if self.done:
             return False
         payload_kg = env.worksite.soil.payload_mass_kg
@@ -130,7 +132,7 @@ class ScriptedOperator:
         return arrived or self._time_s > self._motion.duration_s + OVERTIME_S
 
 
-def _bucket_pose(joint_pos: np.ndarray) -> BucketPose:
+def _bucket_pose(joint_pos: NDArray[np.float64]) -> BucketPose:
     edge_pos_w, pitch_rad = forward(joint_pos)
     radius, _, height = cylinder_from_world(edge_pos_w)
     return BucketPose(radius_m=radius, height_m=height, pitch_rad=pitch_rad, swing_rad=float(joint_pos[0]))

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.constants import BUCKET_LENGTH_M, JOINT_ACCEL_RAD_S2, JOINT_SPEED_RAD_S
 from lerobot_excav.envs.excavator.kinematics import inverse
@@ -72,7 +73,7 @@ def line(start: BucketPose, end: BucketPose, *, about_pin: bool, samples: int = 
     return poses
 
 
-def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> np.ndarray:
+def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> NDArray[np.float64]:
     """Solve for the joints, giving way in pitch where the wanted one is out of reach.
 
     Args:
@@ -87,11 +88,11 @@ def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> np.ndarray:
     """
     for deviation in _PITCH_SEARCH_RAD:
         for sign in (1.0, -1.0):
-            pitch = pose.pitch_rad + sign * deviation
+            pitch = pose.pitch_rad + sign * float(deviation)
             radius, height = pose.radius_m, pose.height_m
             if keep == "pin":
-                radius = pose.pin_radius_m + BUCKET_LENGTH_M * np.cos(pitch)
-                height = pose.pin_height_m + BUCKET_LENGTH_M * np.sin(pitch)
+                radius = pose.pin_radius_m + BUCKET_LENGTH_M * float(np.cos(pitch))
+                height = pose.pin_height_m + BUCKET_LENGTH_M * float(np.sin(pitch))
             joint_pos = inverse(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=pose.swing_rad)
             if joint_pos is not None:
                 return joint_pos
@@ -109,7 +110,7 @@ class JointMotion:
         speed: Fraction of the machine's speeds to use.
     """
 
-    def __init__(self, path: Sequence[np.ndarray] | np.ndarray, *, speed: float) -> None:
+    def __init__(self, path: Sequence[NDArray[np.float64]] | NDArray[np.float64], *, speed: float) -> None:
         self._path = np.asarray(path)
         limit = speed * np.asarray(JOINT_SPEED_RAD_S)
         steps_s = np.maximum(np.max(np.abs(np.diff(self._path, axis=0)) / limit, axis=1), 1e-6)
@@ -122,7 +123,7 @@ class JointMotion:
         self._ramp_s = ramp_s * self._top
         self.duration_s = span_s / self._top + self._ramp_s
 
-    def at(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return wanted joint positions [rad] and velocities [rad/s] at a time, each shape (4,)."""
         ahead, behind = self._clock_at(time_s + 0.01), self._clock_at(time_s - 0.01)
         return self._positions(self._clock_at(time_s)), (
@@ -130,7 +131,7 @@ class JointMotion:
         ) / 0.02
 
     @property
-    def end(self) -> np.ndarray:
+    def end(self) -> NDArray[np.float64]:
         """Joint positions at the end of the path [rad], shape (4,)."""
         return np.asarray(self._path[-1])
 
@@ -145,5 +146,5 @@ class JointMotion:
             return float(self._clock_s[-1]) - 0.5 * top * left * left / ramp
         return top * (t - 0.5 * ramp)
 
-    def _positions(self, clock_s: float) -> np.ndarray:
+    def _positions(self, clock_s: float) -> NDArray[np.float64]:
         return np.array([np.interp(clock_s, self._clock_s, self._path[:, j]) for j in range(4)])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.layout import TARGET_BOX, cylinder_from_world, world_from_cylinder
 from lerobot_excav.envs.excavator.operator.path import BucketPose, line
@@ -54,7 +55,7 @@ def plan_cut(soil: Soil, target: Target, variation: Variation) -> CutPlan:
     radius, swing, _ = cylinder_from_world(target.center_w)
     entry_radius = radius + variation.entry_along_m
     swing += variation.entry_across_m / radius
-    radii = np.arange(entry_radius, LEAST_RADIUS_M, -CUT_STEP_M)
+    radii = np.arange(entry_radius, LEAST_RADIUS_M, -CUT_STEP_M, dtype=np.float64)
     surface = soil.height_at(world_from_cylinder(radii, np.full_like(radii, swing)))
     heights = _cut_heights(radii, surface, variation.depth_m, variation.cut_volume_m3)
     pitches = np.linspace(variation.attack_pitch_rad, variation.roll_in_pitch_rad, heights.size)
@@ -120,7 +121,9 @@ def _over_box(variation: Variation) -> BucketPose:
     )
 
 
-def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float, volume_m3: float) -> np.ndarray:
+def _cut_heights(
+    radii: NDArray[np.float64], surface_m: NDArray[np.float64], depth_m: float, volume_m3: float
+) -> NDArray[np.float64]:
     """Height of the edge along the cut [m], as long as it takes to sweep the wanted volume.
 
     Where the pile is too small for the wanted depth of cut, cut deeper rather than bring half a bucket.
@@ -132,7 +135,7 @@ def _cut_heights(radii: np.ndarray, surface_m: np.ndarray, depth_m: float, volum
         swept_m3 = np.cumsum(np.maximum(surface_m - heights, 0.0)) * CUT_STEP_M * BUCKET_WIDTH_M
         enough = np.nonzero(swept_m3 >= volume_m3)[0]
         if enough.size:
-            return heights[: max(int(enough[0]) + 1, 3)]
+            return np.asarray(heights[: max(int(enough[0]) + 1, 3)])
     # The whole pile along this line is less than a bucket: stop where it ends.
     last = int(np.argmax(swept_m3 >= swept_m3[-1] - 1e-9))
-    return heights[: max(last + 1, 3)]
+    return np.asarray(heights[: max(last + 1, 3)])

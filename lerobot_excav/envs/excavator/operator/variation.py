@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +74,7 @@ class Tremor:
         self._rng, self._size, self._time_constant_s = rng, size, time_constant_s
         self._value = np.zeros(4)
 
-    def step(self, dt_s: float) -> np.ndarray:
+    def step(self, dt_s: float) -> NDArray[np.float64]:
         """Return the noise after a further `dt_s`, shape (4,)."""
         keep = np.exp(-dt_s / self._time_constant_s)
         self._value = keep * self._value + self._size * np.sqrt(1.0 - keep**2) * self._rng.standard_normal(4)
