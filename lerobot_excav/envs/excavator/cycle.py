@@ -1,5 +1,6 @@
 """One dig-load-dump cycle: its measurements, its outcome and when that outcome is final."""
 
+import math
 from typing import Any
 
 from lerobot_excav.envs.excavator.constants import TICK_S
@@ -83,8 +84,8 @@ class DigCycle:
             "excavated_mass_kg": self.state.excavated_mass_kg,
             "hard_target_contacts": self.state.hard_target_contacts,
             "spill_before_target_events": self.state.spill_before_target_events,
-            # -1 stands for "never loaded": vector environments cannot carry None.
-            "loading_onset_time_s": -1.0 if self.onset_time_s is None else self.onset_time_s,
+            # Not a number: never loaded. Vector environments cannot carry None; the metrics file says null.
+            "loading_onset_time_s": math.nan if self.onset_time_s is None else self.onset_time_s,
             "cycle_complete": self.is_complete,
             "duration_s": self._ticks * TICK_S,
         }
