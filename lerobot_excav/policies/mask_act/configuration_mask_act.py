@@ -1,5 +1,6 @@
 """Settings of `--policy.type=mask_act`."""
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,8 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import PRESETS
+
+logger = logging.getLogger(__name__)
 
 TARGET_MASK_KEY = "observation.images.target_mask"
 
@@ -83,14 +86,23 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
 
     def __post_init__(self) -> None:
         """Fill what the preset decides, then check every field."""
-        self._apply_preset()
+        try:
+            self._apply_preset()
+            self._apply_rules()
+            self._check_network()
+            self._check_training()
+            super().__post_init__()
+        except ValueError as error:
+            # LeRobot's command line replaces a ValueError by "Couldn't instantiate class MaskACTConfig", so that its
+            # user would never learn which setting was wrong.
+            logger.error("%s", error)
+            raise
+
+    def _apply_rules(self) -> None:
         if self.n_action_steps is None:
             self.n_action_steps = 1 if self.temporal_ensemble_coeff is not None else self.chunk_size
         if self.backbone_norm is None:
             self.backbone_norm = "batch" if self.pretrained_backbone_weights is None else "frozen"
-        self._check_network()
-        self._check_training()
-        super().__post_init__()
 
     def _apply_preset(self) -> None:
         require_choice("preset", self.preset, PRESETS)

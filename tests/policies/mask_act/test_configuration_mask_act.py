@@ -107,6 +107,12 @@ def test_a_bad_setting_is_refused_by_name(config, settings, message):
         config(**settings)
 
 
+def test_the_command_line_says_which_setting_is_bad(caplog):
+    with pytest.raises(draccus.utils.ParsingError):
+        draccus.parse(MaskACTConfig, args=["--preset=quick"])
+    assert "preset='quick' is not known; allowed: 'paper', 'fast'." in caplog.text
+
+
 def test_action_steps_follow_chunk_size_and_ensembling(config):
     assert config().n_action_steps == 8
     assert config(temporal_ensemble_coeff=0.01).n_action_steps == 1
