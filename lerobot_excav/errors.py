@@ -8,8 +8,11 @@ class ExcavError(Exception):
     """Base of every error that this package raises on purpose."""
 
 
-class ConfigurationError(ExcavError, ValueError):
-    """A setting, an argument or an input has a value that cannot be used."""
+class ConfigurationError(ExcavError):
+    """A setting, an argument or an input has a value that cannot be used.
+
+    Not a ValueError: LeRobot's command line parser replaces those by a message that does not name the setting.
+    """
 
 
 class DatasetError(ExcavError, ValueError):

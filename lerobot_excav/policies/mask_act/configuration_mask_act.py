@@ -1,6 +1,5 @@
 """Settings of `--policy.type=mask_act`."""
 
-import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +14,6 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import PRESETS
-
-logger = logging.getLogger(__name__)
 
 TARGET_MASK_KEY = "observation.images.target_mask"
 
@@ -86,17 +83,11 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
 
     def __post_init__(self) -> None:
         """Fill what the preset decides, then check every field."""
-        try:
-            self._apply_preset()
-            self._apply_rules()
-            self._check_network()
-            self._check_training()
-            super().__post_init__()
-        except ValueError as error:
-            # LeRobot's command line replaces a ValueError by "Couldn't instantiate class MaskACTConfig", so that its
-            # user would never learn which setting was wrong.
-            logger.error("%s", error)
-            raise
+        self._apply_preset()
+        self._apply_rules()
+        self._check_network()
+        self._check_training()
+        super().__post_init__()
 
     def _apply_rules(self) -> None:
         if self.n_action_steps is None:
