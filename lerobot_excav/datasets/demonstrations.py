@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lerobot_excav.datasets.assembly import append_episode, create_dataset
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.episode_store import EpisodeStore
 from lerobot_excav.datasets.pair import Pair
@@ -20,7 +19,8 @@ from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.partial_run import PartialRun
 from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.provenance import read_provenance, write_provenance
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig, play_demonstration
+from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.simulation import simulate_episode
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
 
@@ -104,9 +104,14 @@ def _fill(
 ) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
     pairs = settings.pairs()
-    dataset = create_dataset(partial.dataset, fps=settings.fps, height=settings.height, width=settings.width)
     with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:
         futures = {pair: _start(pool, progress, rig, settings, pair, partial.episodes) for pair in pairs}
+        # LeRobot takes seconds to load; by now the workers are at work.
+        from lerobot_excav.datasets.assembly import append_episode, create_dataset
+
+        dataset = create_dataset(
+            partial.dataset, fps=settings.fps, height=settings.height, width=settings.width
+        )
         outcomes = []
         for pair, future in futures.items():
             outcome = episode_result(pair, future)
@@ -141,19 +146,3 @@ def _start(
         future.set_result(finished)
         return future
     return submit_episode(pool, progress, simulate_episode, rig, settings, pair, folder)
-
-
-def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
-    """Play one episode and store it; runs in a worker.
-
-    Args:
-        rig: Environment and operator.
-        settings: What is being recorded.
-        pair: Scene and target.
-        folder: Folder of finished episodes.
-
-    Returns:
-        Outcome of the episode.
-    """
-    episode = play_demonstration(rig, settings, pair)
-    return EpisodeStore(folder).write(episode, keep_frames=episode.success or settings.keep_failures)

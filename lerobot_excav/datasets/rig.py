@@ -1,14 +1,12 @@
 """Where demonstrations come from: an environment and an operator for given settings."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.episode import Environment, Episode, Operator, demonstrate
-from lerobot_excav.datasets.pair import Pair
+from lerobot_excav.datasets.episode import Environment, Operator
 
 
 class Rig(Protocol):
@@ -55,18 +53,3 @@ class ExcavatorRig:
         from lerobot_excav.envs.excavator.operator import ScriptedOperator
 
         return ScriptedOperator(rng=rng)
-
-
-def play_demonstration(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> Episode:
-    """Play one episode with the rig's operator; the same arguments give the same episode.
-
-    The environment stays open for the next call with the same rig and settings.
-    """
-    env = _environment(rig, settings)
-    operator = rig.operator(np.random.default_rng(settings.episode_seed(pair)))
-    return demonstrate(env, operator, pair)
-
-
-@lru_cache(maxsize=1)
-def _environment(rig: Rig, settings: DemonstrationSettings) -> Environment:
-    return rig.environment(settings)

@@ -7,7 +7,8 @@ from typing import Any
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.progress import EpisodeProgress
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig, play_demonstration
+from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
 

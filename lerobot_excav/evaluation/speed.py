@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.rig import ExcavatorRig, play_demonstration
+from lerobot_excav.datasets.rig import ExcavatorRig
+from lerobot_excav.datasets.simulation import play_demonstration
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,12 +6,13 @@ import pyarrow.parquet as pq
 import pytest
 from lerobot.datasets import LeRobotDataset
 
+from lerobot_excav.datasets import simulation
 from lerobot_excav.datasets.demonstrations import record_demonstrations
 from lerobot_excav.datasets.episode_store import EpisodeStore
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.partial_run import PartialRun
 from lerobot_excav.datasets.provenance import read_provenance
-from lerobot_excav.datasets.rig import play_demonstration
+from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
@@ -49,9 +50,7 @@ def test_frames_read_back_as_they_were_played(paired_dataset, toy_rig, toy_setti
 def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, record_toy, toy_rig, monkeypatch):
     record_toy(tmp_path / "whole")
     played = []
-    from lerobot_excav.datasets import demonstrations
-
-    play = demonstrations.play_demonstration
+    play = simulation.play_demonstration
 
     def interrupted(rig, settings, pair):
         if len(played) == 5:
@@ -59,11 +58,11 @@ def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, record_toy, to
         played.append(pair)
         return play(rig, settings, pair)
 
-    monkeypatch.setattr(demonstrations, "play_demonstration", interrupted)
+    monkeypatch.setattr(simulation, "play_demonstration", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record_toy(tmp_path / "broken")
     assert not (tmp_path / "broken").exists()
-    monkeypatch.setattr(demonstrations, "play_demonstration", lambda *a: (played.append(a[2]), play(*a))[1])
+    monkeypatch.setattr(simulation, "play_demonstration", lambda *a: (played.append(a[2]), play(*a))[1])
     record_toy(tmp_path / "broken", resume=True)
     assert len(played) == len(set(played)) == 12
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
