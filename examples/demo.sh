@@ -3,8 +3,8 @@
 # Usage: examples/demo.sh OUTPUT_FOLDER      Steps that are finished are not run again; delete the folder to start over.
 set -euo pipefail
 OUT=${1:?usage: demo.sh OUTPUT_FOLDER}
-SCENES=${DEMO_SCENES:-10}    # x 4 targets = paired demonstrations
-STEPS=${DEMO_STEPS:-1500}    # training steps
+SCENES=${DEMO_SCENES:-6}     # x 4 targets = paired demonstrations
+STEPS=${DEMO_STEPS:-900}     # training steps
 EPISODES=${DEMO_EPISODES:-4} # evaluation episodes, on test scenes
 mkdir -p "$OUT"
 
@@ -16,9 +16,10 @@ say "1/3  Recording $((SCENES * 4)) paired demonstrations -> $OUT/dataset"
 say "2/3  Training mask_act for $STEPS steps -> $OUT/train"
 [ -d "$OUT/train/checkpoints/last" ] || {
   rm -rf "$OUT/train"
-  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.device=cpu --policy.push_to_hub=false \
+  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.target_token=true \
+    --policy.chunk_size=10 --policy.actions_per_token=1 --policy.device=cpu --policy.push_to_hub=false \
     --dataset.repo_id=local/excavator_demo --dataset.root="$OUT/dataset" --output_dir="$OUT/train" \
-    --steps="$STEPS" --batch_size=16 --num_workers=0 --log_freq=50 --save_freq="$STEPS" --env_eval_freq=0 --wandb.enable=false
+    --steps="$STEPS" --batch_size=16 --num_workers=1 --log_freq=50 --save_freq="$STEPS" --env_eval_freq=0 --wandb.enable=false
 }
 
 say "3/3  Evaluating on $EPISODES test scenes -> $OUT/eval"
