@@ -36,7 +36,7 @@ demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a vi
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
 
 test: $(READY) ## run the test suite
-	@$(RUN)/pytest -n 2
+	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal
 
 lint: $(READY) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .
