@@ -13,6 +13,7 @@ from lerobot_excav.envs.excavator.operator.path import BucketPose, UnreachableEr
 from lerobot_excav.envs.excavator.operator.plan import FLOOR_CLEARANCE_M, plan_carry, plan_cut, plan_dump
 from lerobot_excav.envs.excavator.operator.variation import draw_variation
 from lerobot_excav.envs.excavator.scene import SOIL_CELL_SIZE_M, draw_scene
+from lerobot_excav.envs.excavator.targets import Target
 from lerobot_excav.envs.soil import Soil
 
 
@@ -60,12 +61,14 @@ def test_cut_goes_towards_the_machine_and_rolls_in(scene, soil):
     assert pitches[-1] < pitches[0]
 
 
-def test_deeper_style_cuts_deeper(scene, soil):
-    style = variations()[0]
-    highest = max(scene.targets, key=lambda target: target.center_w[2])
-    shallow = plan_cut(soil, highest, dataclasses.replace(style, depth_m=0.3))
-    deep = plan_cut(soil, highest, dataclasses.replace(style, depth_m=0.4))
-    assert deep.cut[12].height_m < shallow.cut[12].height_m
+def test_deeper_style_cuts_deeper_where_there_is_soil():
+    soil = Soil(cell_size_m=SOIL_CELL_SIZE_M)
+    soil.reset(np.ones_like(soil.heights_m))
+    target, style = Target(center_w=np.array([0.5, 0.0, 1.0]), yaw_rad=0.0), variations()[0]
+    depths = [0.3, 0.4]
+    cuts = [plan_cut(soil, target, dataclasses.replace(style, depth_m=depth)).cut for depth in depths]
+    lowest = [min(pose.height_m for pose in cut) for cut in cuts]
+    assert lowest == pytest.approx([0.7, 0.6])
 
 
 def test_load_is_carried_level_over_the_wall_and_dumped_over_the_box():
