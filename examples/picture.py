@@ -11,6 +11,7 @@ from PIL import Image
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.targets import target_mask_img
 
 TINT_RGB = np.array([235, 60, 40])
@@ -18,18 +19,22 @@ TINT_RGB = np.array([235, 60, 40])
 
 def main(path: Path, scene_id: int, target_id: int) -> None:
     """Play one cycle until the bucket comes up full, and save the main view beside the cab's."""
-    env = ExcavatorEnv(scene_set="train", observation_height=480, observation_width=640)
+    env = ExcavatorEnv(scene_set="train", obs_type="agent_pos")
     env.reset(options={"scene_id": scene_id, "target_id": target_id})
     operator = ScriptedOperator(rng=np.random.default_rng(0))
     operator.reset(env)
     while operator.phase != "carry":
-        observation, *_ = env.step(operator.act(env))
-    main_view, cab_view = observation["pixels"]["main"], observation["pixels"]["cab"]
-    region = target_mask_img(env.target, env.renderer.terrain_points_w(env.worksite.soil))[..., 0] > 0
+        env.step(operator.act(env))
+    # Drawn at twice the size and reduced: the renderer does not smooth edges.
+    renderer = WorksiteRenderer(env.worksite.machine, height=960, width=1280)
+    soil = env.worksite.soil
+    main_view, cab_view = renderer.render("main", soil), renderer.render("cab", soil)
+    region = target_mask_img(env.target, renderer.terrain_points_w(soil))[..., 0] > 0
     main_view[region] = (0.45 * main_view[region] + 0.55 * TINT_RGB).astype(np.uint8)
-    env.close()
+    renderer.close()
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(np.concatenate([main_view, cab_view], axis=1)).save(path, optimize=True)
+    picture = Image.fromarray(np.concatenate([main_view, cab_view], axis=1))
+    picture.resize((1280, 480), Image.Resampling.LANCZOS).save(path, optimize=True)
 
 
 if __name__ == "__main__":
