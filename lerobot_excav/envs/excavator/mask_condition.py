@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.errors import ExcavError
+from lerobot_excav.envs.settings import MASK_CONDITIONS
+from lerobot_excav.errors import ExcavError, require_choice
 
 _SHIFT_TRIES = 1000
 
@@ -24,7 +25,18 @@ def conditioned_mask(
 
     Returns:
         Mask (H, W, 3) of {0, 255}, uint8.
+
+    Raises:
+        ConfigurationError: There is no such condition.
+        ExcavError: The picture shows nothing of the commanded target, or no other place is free for its blob.
     """
+    require_choice("mask_condition", condition, MASK_CONDITIONS)
+    if not masks[target_id].any():
+        height, width = masks[target_id].shape[:2]
+        raise ExcavError(
+            f"target_id={target_id} covers no pixel of a picture of {height} x {width}; "
+            "use larger observation_height and observation_width"
+        )
     if condition == "zero":
         return np.zeros_like(masks[target_id])
     if condition == "random":

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
-from lerobot_excav.errors import ExcavError
+from lerobot_excav.envs.settings import MASK_CONDITIONS
+from lerobot_excav.errors import ConfigurationError, ExcavError
 
 
 @pytest.fixture
@@ -35,6 +36,18 @@ def test_random_shows_a_blob_of_the_same_size_off_its_place(masks, rng, target_i
 def test_mismatched_shows_another_target_and_in_time_every_other(masks, rng, target_id):
     shown = {conditioned_mask(masks, target_id, "mismatched", rng).tobytes() for _ in range(60)}
     assert shown == {masks[i].tobytes() for i in range(4) if i != target_id}
+
+
+def test_unknown_condition_is_refused(masks, rng):
+    with pytest.raises(ConfigurationError, match=r"mask_condition='none'.*'mismatched'"):
+        conditioned_mask(masks, 2, "none", rng)
+
+
+@pytest.mark.parametrize("condition", MASK_CONDITIONS)
+def test_target_without_a_pixel_is_refused(masks, rng, condition):
+    masks[1][:] = 0
+    with pytest.raises(ExcavError, match=r"target_id=1 .*40 x 60.*observation_height"):
+        conditioned_mask(masks, 1, condition, rng)
 
 
 def test_blob_too_large_to_move_says_what_to_change(rng):
