@@ -1,11 +1,14 @@
 """Completing a recording of `lerobot-record` with the columns that only the simulation knows.
 
 The recorder stores pictures, state and action. The actions are played again from the scene that the session log names;
-if the recorded states come out, so do the task state and the outcome of the original.
+if the recorded states come out, so do the task state and the outcome of the original. All targets of a scene start from
+the same state, so states cannot tell them apart: the target is known by its mask.
 """
 
+import functools
 import shutil
 import uuid
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
+    MASK_KEY,
     PAIR_KEY,
     SCENE_KEY,
     STATE_KEY,
@@ -26,12 +30,17 @@ from lerobot_excav.datasets.schema import (
     TARGET_KEY,
     TASK_STATE_KEY,
     excav_features,
+    require_columns,
 )
 from lerobot_excav.datasets.session import SESSION_PATH, SessionEpisode, read_session
 from lerobot_excav.errors import DatasetError
 
 STATE_TOLERANCE = 1e-4
 """Allowed deviation of a state [rad, rad/s]; the same build repeats exactly, another processor may round (guess)."""
+
+MASK_OVERLAP = 0.8
+"""Least intersection over union of recorded and drawn mask; another graphics card may draw its border differently, but
+the patches of two targets lie apart (guess)."""
 
 
 def complete_recording(
@@ -55,6 +64,7 @@ def complete_recording(
         raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
     session = read_session(session_path)
     _require_completable(root, session)
+    _require_recorded_targets(root, session, rig or ExcavatorRig())
     rig = rig or ExcavatorRig(with_images=False)
     episodes = {
         recorded.index: _resimulate(rig, recorded, session[recorded.index])
@@ -78,6 +88,7 @@ def _require_completable(root: Path, session: dict[int, SessionEpisode]) -> None
         raise DatasetError(
             f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
         )
+    require_columns(info.features | excav_features())
     missing = [index for index in range(info.total_episodes) if index not in session]
     if missing:
         raise DatasetError(
@@ -95,6 +106,38 @@ def _require_completable(root: Path, session: dict[int, SessionEpisode]) -> None
                 f"episode {index} was restarted at frame {list(episode.restarts)}, so it is no single demonstration; "
                 "record it again (lerobot-record offers re-recording with the left arrow key, or r)"
             )
+
+
+def _require_recorded_targets(root: Path, session: dict[int, SessionEpisode], rig: Rig) -> None:
+    """Check that every episode has the length and the mask that its line of the session announces."""
+    hint = "was the dataset edited after recording? Index first, edit afterwards"
+    with ExitStack() as stack:
+        # All episodes of a session share their settings, and a graphics context is slow to open.
+        environment = functools.cache(
+            lambda settings: stack.enter_context(closing(rig.environment(settings)))
+        )
+        for recorded in iterate_episodes(root, (MASK_KEY,)):
+            episode = session[recorded.index]
+            if episode.frames not in (None, recorded.length):
+                raise DatasetError(
+                    f"episode {recorded.index} has {recorded.length} frames, but the session noted "
+                    f"{episode.frames} for {episode.pair.uid}; {hint}"
+                )
+            options = {"scene_id": episode.scene_id, "target_id": episode.target_id}
+            observation, _ = environment(episode.settings()).reset(options=options)
+            if not _same_mask(recorded.image(MASK_KEY, 0), observation["pixels"]["target_mask"]):
+                raise DatasetError(
+                    f"episode {recorded.index} does not show the target mask of {episode.pair.uid}, "
+                    f"which the session names; {hint}"
+                )
+
+
+def _same_mask(recorded_img: NDArray[Any], drawn_img: NDArray[Any]) -> bool:
+    """Compare two masks (H, W, 3), binarised at mid-grey."""
+    if recorded_img.shape != drawn_img.shape:
+        return False
+    recorded, drawn = recorded_img[..., 0] > 127, drawn_img[..., 0] > 127
+    return bool((recorded & drawn).sum() >= MASK_OVERLAP * max((recorded | drawn).sum(), 1))
 
 
 def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Episode:
@@ -131,7 +174,7 @@ def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> Non
         TASK_STATE_KEY: (task_state, excav_features()[TASK_STATE_KEY]),
         SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
     }
-    dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root)
+    dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)
 
 

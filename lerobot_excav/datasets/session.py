@@ -32,6 +32,7 @@ class SessionEpisode:
         observation_height: Image height [px].
         observation_width: Image width [px].
         task: Task of the environment.
+        frames: How many actions were carried out; None if the line does not say.
         restarts: Frames after which the scene was restarted within the episode.
     """
 
@@ -44,6 +45,7 @@ class SessionEpisode:
     observation_height: int
     observation_width: int
     task: str
+    frames: int | None = None
     restarts: tuple[int, ...] = ()
 
     @property
@@ -93,7 +95,7 @@ def _episode(line: str, place: str) -> SessionEpisode:
     except json.JSONDecodeError as error:
         raise DatasetError(f"{place}: not JSON ({error}); the file is damaged") from error
     values = {field.name: record[field.name] for field in fields(SessionEpisode) if field.name in record}
-    missing = {field.name for field in fields(SessionEpisode)} - {"restarts"} - set(values)
+    missing = {field.name for field in fields(SessionEpisode)} - {"frames", "restarts"} - set(values)
     if missing:
         raise DatasetError(
             f"{place}: lacks {', '.join(sorted(missing))}; is it a session log of excavator_sim?"

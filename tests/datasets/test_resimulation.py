@@ -4,7 +4,7 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from lerobot.datasets import LeRobotDataset, merge_datasets, remove_feature
+from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
 
 from lerobot_excav.datasets import resimulation
 from lerobot_excav.datasets.paired_index import INDEX_PATH, read_index, write_index
@@ -120,6 +120,9 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
     ("changes", "message"),
     [
         ({1: {"fps": 5}}, "ran at 5 frames/s, the dataset has 10"),
+        ({1: {"frames": 5}}, r"episode 1 has 6 frames, but the session noted 5 .* edited after recording"),
+        ({1: {"target_id": 2}}, r"episode 1 does not show the target mask of excavator/train/0/2"),
+        ({1: {"observation_height": 64}}, r"episode 1 does not show the target mask"),
         ({1: {"restarts": [3]}}, r"episode 1 was restarted at frame \[3\]"),
         ({1: {"episode_index": 99}}, r"no line for episodes \[1\]"),
     ],
@@ -128,6 +131,25 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, toy_rig, tmp
     folder, _ = recording
     with pytest.raises(DatasetError, match=message):
         complete_recording(folder / "recording", session(changes), out=tmp_path / "c", rig=toy_rig())
+
+
+def test_a_recording_edited_before_indexing_is_refused(recording, toy_rig, tmp_path):
+    folder, _ = recording
+    dataset = LeRobotDataset("local/toy", root=folder / "recording", video_backend="pyav")
+    delete_episodes(dataset, [0], output_dir=tmp_path / "edited", repo_id="local/edited")
+    with pytest.raises(
+        DatasetError, match=r"episode 0 .* excavator/train/0/0, .*Index first, edit afterwards"
+    ):
+        complete_recording(tmp_path / "edited", folder / "session.jsonl", rig=toy_rig())
+    assert "excav.pair_uid" not in (tmp_path / "edited" / "meta" / "info.json").read_text()
+
+
+def test_a_session_without_frame_counts_is_accepted(recording, toy_rig, tmp_path):
+    folder, lines = recording
+    bare = [{key: value for key, value in line.items() if key != "frames"} for line in lines]
+    session = write_session(tmp_path / "s.jsonl", bare)
+    out = complete_recording(folder / "recording", session, out=tmp_path / "c", rig=toy_rig())
+    assert len(read_index(out)) == 19
 
 
 def test_a_failure_while_writing_leaves_the_recording_alone(recording, toy_rig, tmp_path, monkeypatch):
