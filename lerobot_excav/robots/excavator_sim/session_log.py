@@ -63,7 +63,7 @@ class SessionLog:
 
     def note_restart(self) -> None:
         """Note that the scene was restarted or changed within the episode, if one is running."""
-        if self._is_running and self._episode is not None and self._episode["frames"] > 0:
+        if self._is_running and self._episode is not None:
             self._episode["restarts"].append(self._episode["frames"])
 
     def pause(self) -> None:

@@ -101,12 +101,12 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
 def test_restarts_within_an_episode_are_noted(make_robot: MakeRobot) -> None:
     robot = make_robot()
     logging.info("Recording episode 0")
-    robot.send_action(STILL | {"reinitialise": 1.0})  # before the first frame: harmless
+    robot.send_action(STILL | {"reinitialise": 1.0})  # LeRobot records this frame too
     robot.send_action(STILL)
     robot.send_action(STILL | {"reinitialise": 1.0})
     robot.send_action(STILL)
     logging.info("Stop recording")
-    assert [(line["frames"], line["restarts"]) for line in lines_of(robot)] == [(2, [1])]
+    assert [(line["frames"], line["restarts"]) for line in lines_of(robot)] == [(2, [0, 1])]
 
 
 def test_a_discarded_last_episode_is_not_logged(make_robot: MakeRobot) -> None:
