@@ -1,7 +1,7 @@
 # Every target sets up what it needs; on a fresh machine only Python 3.12 and git have to be there.
 # `make PYTHON=/path/to/python3.12 …` chooses the interpreter, `make help` lists the targets.
 
-PYTHON ?= python3.12
+PYTHON ?= $(shell command -v python3.12 || command -v python3 || echo python3.12)
 VENV := .venv
 UV := $(VENV)/bin/uv
 RUN := $(VENV)/bin
@@ -23,11 +23,15 @@ setup: $(READY) ## install everything into .venv
 
 $(READY): pyproject.toml uv.lock
 	@command -v $(PYTHON) >/dev/null 2>&1 && $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] < (3, 12))' || { \
-	  echo "make: no Python 3.12 found as '$(PYTHON)'."; \
-	  echo "  Debian 13, Ubuntu 24.04: sudo apt-get install python3.12 python3.12-venv"; \
+	  echo "make: '$(PYTHON)' is no Python 3.12 or later."; \
+	  echo "  Debian 13: sudo apt-get install python3 python3-venv"; \
+	  echo "  Ubuntu 24.04: sudo apt-get install python3.12 python3.12-venv"; \
 	  echo "  macOS: brew install python@3.12      anywhere: pyenv install 3.12 or https://www.python.org/downloads/"; \
 	  echo "  Then run make again, or name it: make PYTHON=/path/to/python3.12 …"; exit 1; }
-	@test -x $(UV) || { $(PYTHON) -m venv $(VENV) && $(VENV)/bin/python -m pip install --quiet "uv>=0.5"; }
+	@test -x $(UV) || $(PYTHON) -m venv $(VENV) || { \
+	  echo "make: '$(PYTHON) -m venv' failed; Debian 13: sudo apt-get install python3-venv,"; \
+	  echo "  Ubuntu 24.04: sudo apt-get install python3.12-venv; then run make again."; exit 1; }
+	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
 	@echo "Installing into $(VENV) (LeRobot, PyTorch and MuJoCo: several GB the first time) …"
 	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact
 	@touch $@
