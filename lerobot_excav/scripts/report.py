@@ -1,8 +1,8 @@
 """Make the table of one or more evaluations.
 
 RESULTS are metrics files (--env.metrics_path of lerobot-eval), or folders with a metrics.jsonl in them. LABEL=FILE
-names a run; files of one label are training seeds of one policy. With several runs, each is compared with the first,
-scene by scene.
+names a run; files given the same LABEL= are training seeds of one policy. With several runs, each is compared with
+the first, scene by scene.
 
 Examples:
   lerobot-excav report outputs/metrics.jsonl
@@ -50,20 +50,34 @@ def runs_from(results: list[str]) -> list[Run]:
         results: `[LABEL=]PATH` each; without a label, the name of the file, or of its folder if that says more.
 
     Raises:
-        ConfigurationError: One file was given twice.
+        ConfigurationError: One file was given twice, or two runs without a label would have the same name.
         DatasetError: A file cannot be used.
     """
     files: dict[str, list[Path]] = {}
+    unlabeled = set()
     for result in results:
-        label, separator, name = result.rpartition("=")
-        path = Path(name)
-        files.setdefault(label if separator else _default_label(path), []).append(path)
+        label, path = _label_and_path(result)
+        name = label or _default_label(path)
+        require(
+            name not in files or (bool(label) and name not in unlabeled),
+            f"{path} and {files.get(name, [path])[0]} would both be called {name!r}; name them LABEL=FILE, with "
+            "one label if they are training seeds of one policy",
+        )
+        if not label:
+            unlabeled.add(name)
+        files.setdefault(name, []).append(path)
     named = [path.resolve() for paths in files.values() for path in paths]
     require(len(set(named)) == len(named), "RESULTS name a file twice; a file is one evaluation")
     return [
         Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths))
         for label, paths in files.items()
     ]
+
+
+def _label_and_path(result: str) -> tuple[str, Path]:
+    """Split `[LABEL=]PATH`; what exists as it stands is a path without a label."""
+    label, separator, name = result.partition("=")
+    return ("", Path(result)) if not separator or Path(result).exists() else (label, Path(name))
 
 
 def _default_label(path: Path) -> str:

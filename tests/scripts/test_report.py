@@ -54,6 +54,20 @@ def test_a_folder_is_named_by_itself(metrics):
     assert [run.label for run in runs_from([str(path.parent)])] == ["masked"]
 
 
+@pytest.mark.parametrize(("first", "second"), [("", ""), ("", "m="), ("m=", "")])
+def test_only_an_explicit_label_makes_files_seeds_of_one_run(metrics, first, second):
+    paths = [metrics("a/m.jsonl", 1.0), metrics("b/m.jsonl", 1.0)]
+    with pytest.raises(ConfigurationError, match="both be called 'm'; name them LABEL=FILE"):
+        runs_from([f"{first}{paths[0]}", f"{second}{paths[1]}"])
+
+
+def test_a_path_may_hold_an_equals_sign(metrics):
+    path = metrics("lr=1/m.jsonl", 1.0)
+    labels = [run.label for run in runs_from([str(path)])]
+    assert labels == ["m"]
+    assert [run.label for run in runs_from([f"a={path}"])] == ["a"]
+
+
 def test_a_file_given_twice_is_refused(metrics):
     path = metrics("a.jsonl", 1.0)
     with pytest.raises(ConfigurationError, match="twice"):
