@@ -100,6 +100,11 @@ def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.
         )
         scenes = episodes // targets
     ranks = rows[complete]["scene_rank"].drop_duplicates()
+    if ranks.empty:
+        raise DatasetError(
+            f"no scene has a usable episode for each of the {targets} targets, so there is nothing paired to choose; "
+            "record more, add --include-failures, or choose --select=balanced"
+        )
     return rows[rows["scene_rank"].isin(_first(ranks, scenes, "complete scenes"))]
 
 

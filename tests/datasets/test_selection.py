@@ -33,6 +33,12 @@ pair_sets = st.sets(st.tuples(st.integers(0, 12), st.integers(0, 3)), min_size=1
 @given(pairs=pair_sets, composition=st.sampled_from(COMPOSITIONS), seed=st.integers(0, 5))
 def test_a_selection_has_the_composition_it_names(pairs, composition, seed):
     index = index_of(pairs)
+    if composition == "paired" and max(Counter(scene for scene, _ in pairs).values()) < len(
+        {target for _, target in pairs}
+    ):
+        with pytest.raises(DatasetError, match="nothing paired to choose"):
+            select(index, composition, seed=seed)
+        return
     chosen = select(index, composition, seed=seed)
     assert set(chosen["episode_index"]) <= set(index["episode_index"])
     assert chosen["episode_index"].is_monotonic_increasing
@@ -41,7 +47,7 @@ def test_a_selection_has_the_composition_it_names(pairs, composition, seed):
     per_target = Counter(chosen["target_id"])
     targets = index["target_id"].nunique()
     if composition == "paired":
-        assert set(per_scene.values()) <= {targets}
+        assert set(per_scene.values()) == {targets}
     if composition == "non-paired":
         assert set(per_scene) == set(index["scene_id"])
         assert set(per_scene.values()) == {1}
