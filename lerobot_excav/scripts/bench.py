@@ -18,7 +18,7 @@ import os
 import platform
 from pathlib import Path
 
-from lerobot_excav.errors import require_choice
+from lerobot_excav.errors import require, require_choice
 from lerobot_excav.scripts.demonstration_arguments import DEFAULT_WORKERS, add_settings, settings_from
 
 MEASURES = ("soil", "environment", "writing", "demos", "policy")
@@ -29,13 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
     parser.add_argument(
         "--only",
-        default=",".join(MEASURES),
         help=f"what to time, out of {','.join(MEASURES)} (default: all)",
     )
     parser.add_argument(
         "--workers",
+        dest="recording_workers",
         type=int,
-        default=DEFAULT_WORKERS,
         help=f"processes that record (default: {DEFAULT_WORKERS})",
     )
     parser.add_argument("--json", type=Path, help="also write the numbers to this file")
@@ -46,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     operator.add_argument("--metrics", type=Path, required=True, help="metrics file to write; must not exist")
+    operator.add_argument("--resume", action="store_true", help="continue an interrupted run, or start one")
     add_settings(operator, scene_set="test", scenes=100)
 
 
@@ -57,10 +57,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _machine(arguments: argparse.Namespace) -> int:
     from lerobot_excav.evaluation.speed import measures
 
-    names = arguments.only.split(",")
+    names = list(MEASURES) if arguments.only is None else arguments.only.split(",")
     for name in names:
         require_choice("--only", name, MEASURES)
-    tasks = measures(workers=arguments.workers)
+    workers = arguments.recording_workers
+    tasks = measures(workers=DEFAULT_WORKERS if workers is None else workers)
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     results = []
     for name in names:
@@ -80,8 +81,26 @@ def _operator(arguments: argparse.Namespace) -> int:
     from lerobot_excav.evaluation.report import make_report
     from lerobot_excav.evaluation.report_text import report_text
 
-    evaluate_operator(settings_from(arguments), arguments.metrics, workers=arguments.workers)
+    _require_no_machine_options(arguments)
+    evaluate_operator(
+        settings_from(arguments), arguments.metrics, workers=arguments.workers, resume=arguments.resume
+    )
     operator = Run(label="operator", evaluations=(read_evaluation(arguments.metrics),))
     print(report_text(make_report([operator])))
     print(f"written: {arguments.metrics}")
     return 0
+
+
+def _require_no_machine_options(arguments: argparse.Namespace) -> None:
+    given = {
+        "--quick": arguments.quick,
+        "--only": arguments.only is not None,
+        "--json": arguments.json is not None,
+    }
+    for option, is_given in given.items():
+        require(not is_given, f"{option} has no effect on `bench operator`; leave it out")
+    require(
+        arguments.recording_workers is None,
+        "--workers before `operator` has no effect on it; write it behind: "
+        f"bench operator --workers={arguments.recording_workers}",
+    )

@@ -43,3 +43,10 @@ def test_options_reach_the_measurements(monkeypatch, capsys):
 def test_an_unknown_measurement_is_named(capsys):
     assert main(["bench", "--only=mud"]) == 2
     assert "--only='mud'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--quick", "--only=soil", "--json=x.json", "--workers=3"])
+def test_options_of_the_machine_are_refused_for_the_operator(option, tmp_path, capsys):
+    assert main(["bench", option, "operator", f"--metrics={tmp_path / 'm'}", "--scenes=1"]) == 2
+    assert f"{option.partition('=')[0]} " in capsys.readouterr().err
+    assert not (tmp_path / "m").exists()
