@@ -10,7 +10,7 @@ from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
-from lerobot_excav.errors import DatasetError
+from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
 def evaluate_operator(
@@ -18,37 +18,72 @@ def evaluate_operator(
     path: Path,
     *,
     workers: int = 2,
+    resume: bool = False,
     rig: Rig | None = None,
     show_progress: bool = True,
 ) -> None:
     """Let the scripted operator play scenes without pictures, and write a metrics file.
 
+    Until it is complete the file is called `PATH.partial`; its lines are in the order of the settings.
+
     Args:
         settings: What to play.
-        path: Metrics file; its folder is made. Lines appear in the order of the settings, as soon as they are known.
+        path: Metrics file; its folder is made.
         workers: Worker processes; 0 works in this process.
+        resume: Whether to continue an interrupted run.
         rig: Environment and operator; the excavator by default.
         show_progress: Whether to draw a progress bar.
 
     Raises:
-        DatasetError: The file exists.
+        DatasetError: The file exists, or an interrupted run is in the way.
+        ConfigurationError: The interrupted run has other settings.
         ExcavError: An episode could not be played.
     """
     if path.exists():
         raise DatasetError(f"--metrics={path} exists; choose another file, or remove it first")
+    partial = path.with_name(f"{path.name}.partial")
+    if partial.exists() and not resume:
+        raise DatasetError(f"{partial} is an interrupted run; continue it with --resume, or remove the file")
     path.parent.mkdir(parents=True, exist_ok=True)
-    rig = rig or ExcavatorRig(with_images=False)
     pairs = settings.pairs()
+    lines = _finished_lines(partial, settings, pairs)
+    # Rewritten whole, so that a line torn by the interruption is gone.
+    partial.write_text("".join(f"{line}\n" for line in lines))
+    _play_rest(
+        settings,
+        partial,
+        pairs,
+        len(lines),
+        workers,
+        rig or ExcavatorRig(with_images=False),
+        show=show_progress,
+    )
+    partial.rename(path)
+
+
+def _play_rest(
+    settings: DemonstrationSettings,
+    partial: Path,
+    pairs: list[Pair],
+    first: int,
+    workers: int,
+    rig: Rig,
+    *,
+    show: bool,
+) -> None:
+    """Play the pairs from `first` on and append their lines."""
     with (
-        path.open("w") as file,
+        partial.open("a") as file,
         worker_pool(workers) as pool,
-        EpisodeProgress(len(pairs), show=show_progress) as progress,
+        EpisodeProgress(len(pairs), show=show) as progress,
     ):
-        futures = {
-            pair: submit_episode(pool, progress, play_for_metrics, rig, settings, pair) for pair in pairs
-        }
-        for number, (pair, future) in enumerate(futures.items()):
-            line = {"episode_ix": number, **episode_result(pair, future)}
+        for _ in range(first):
+            progress.skip()
+        futures = [
+            submit_episode(pool, progress, play_for_metrics, rig, settings, pair) for pair in pairs[first:]
+        ]
+        for number, future in enumerate(futures, first):
+            line = {"episode_ix": number, **episode_result(pairs[number], future)}
             file.write(json.dumps(line, allow_nan=False) + "\n")
             file.flush()
 
@@ -56,11 +91,34 @@ def evaluate_operator(
 def play_for_metrics(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
     """Play one episode and return its line of the metrics file; runs in a worker."""
     episode = play_demonstration(rig, settings, pair)
+    return {**_common(settings), "success": episode.success, **episode.metrics}
+
+
+def _common(settings: DemonstrationSettings) -> dict[str, Any]:
+    """Return what all lines share."""
     return {
         "operator": "scripted",
         "operator_seed": settings.seed,
         "task": settings.task,
+        "scene_set": settings.scene_set,
+        "soil": settings.soil,
         "fps": settings.fps,
-        "success": episode.success,
-        **episode.metrics,
+        "episode_length": settings.episode_length,
     }
+
+
+def _finished_lines(partial: Path, settings: DemonstrationSettings, pairs: list[Pair]) -> list[str]:
+    """Return the whole lines of an interrupted run, after checking that they belong to these settings."""
+    if not partial.exists():
+        return []
+    lines = [line for line in partial.read_text().splitlines(keepends=True) if line.endswith("\n")]
+    for line, pair in zip(lines, pairs, strict=False):
+        record = json.loads(line)
+        wanted = {**_common(settings), "scene_id": pair.scene_id, "target_id": pair.target_id}
+        for name, value in wanted.items():
+            if record[name] != value:
+                raise ConfigurationError(
+                    f"{partial} was started with {name}={record[name]!r}, not {value!r}; "
+                    "continue it with the same options, or remove the file"
+                )
+    return [line.rstrip("\n") for line in lines[: len(pairs)]]

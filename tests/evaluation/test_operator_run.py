@@ -1,23 +1,120 @@
-import dataclasses
+from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.errors import DatasetError
+from lerobot_excav.datasets.rig import ExcavatorRig
+from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.operator_run import evaluate_operator
 
+SETTINGS = DemonstrationSettings(scene_set="test", first_scene=1000, scenes=3, targets=1)
 
-@pytest.mark.slow
+
+class StillEnv:
+    """Ends after one frame, with the metrics of a scoop that moved `scene_id` kilograms."""
+
+    task_description = "Stand still."
+
+    def reset(self, *, seed=None, options=None):
+        self.options = options
+        return self._observation(), {"is_success": False, "task_state": np.zeros(8)}
+
+    def step(self, action):
+        metrics = {
+            "scene_set": "test",
+            **self.options,
+            "mask_condition": "correct",
+            "soil": "sand",
+            "target_success": True,
+            "is_success": True,
+            "retained_mass_kg": float(self.options["scene_id"]),
+            "residual_bucket_mass_kg": 0.0,
+            "hard_target_contacts": 0,
+            "spill_before_target_events": 0,
+        }
+        info = {"is_success": True, "task_state": np.zeros(8), "episode_metrics": metrics}
+        return self._observation(), 0.0, True, False, info
+
+    def close(self):
+        pass
+
+    def _observation(self):
+        return {"agent_pos": np.zeros(8)}
+
+
+class StillOperator:
+    def reset(self, env):
+        pass
+
+    def act(self, env):
+        return np.zeros(4, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class StillRig:
+    def environment(self, settings):
+        return StillEnv()
+
+    def operator(self, rng):
+        return StillOperator()
+
+
+def evaluate(path, *, settings=SETTINGS, **options):
+    evaluate_operator(settings, path, workers=0, rig=StillRig(), show_progress=False, **options)
+
+
 def test_the_operators_file_is_read_like_that_of_a_policy(tmp_path):
-    settings = DemonstrationSettings(scene_set="test", first_scene=1000, scenes=2, targets=1)
-    evaluate_operator(settings, tmp_path / "o" / "operator.jsonl", workers=0, show_progress=False)
-    evaluation = read_evaluation(tmp_path / "o" / "operator.jsonl")
+    evaluate(tmp_path / "new" / "operator.jsonl")
+    evaluation = read_evaluation(tmp_path / "new" / "operator.jsonl")
     assert evaluation.operator == "scripted"
     # lerobot-eval with seed 1000 shows scene 1000 + i with target (1000 + i) % 4.
-    assert [str(key) for key in evaluation.episodes] == ["test/1000/0", "test/1001/1"]
-    assert all(episode.retained_mass_kg > 0.0 for episode in evaluation.episodes.values())
+    assert [str(key) for key in evaluation.episodes] == ["test/1000/0", "test/1001/1", "test/1002/2"]
+
+
+@pytest.mark.slow
+def test_the_scripted_operator_fills_the_box_without_pictures(tmp_path):
+    evaluate_operator(
+        replace(SETTINGS, scenes=1),
+        tmp_path / "o.jsonl",
+        workers=0,
+        rig=ExcavatorRig(with_images=False),
+        show_progress=False,
+    )
+    (episode,) = read_evaluation(tmp_path / "o.jsonl").episodes.values()
+    assert episode.retained_mass_kg > 0.0
+
+
+def test_an_existing_file_is_not_overwritten(tmp_path):
+    (tmp_path / "o.jsonl").write_text("mine")
     with pytest.raises(DatasetError, match="exists"):
-        evaluate_operator(
-            dataclasses.replace(settings, scenes=1), tmp_path / "o" / "operator.jsonl", workers=0
-        )
+        evaluate(tmp_path / "o.jsonl")
+    assert (tmp_path / "o.jsonl").read_text() == "mine"
+
+
+def test_an_interrupted_run_continues_to_the_same_file(tmp_path):
+    evaluate(tmp_path / "whole.jsonl")
+    whole = (tmp_path / "whole.jsonl").read_text()
+    # The second line is torn in the middle.
+    (tmp_path / "o.jsonl.partial").write_text(whole[: whole.index("\n") + 20])
+    with pytest.raises(DatasetError, match="--resume"):
+        evaluate(tmp_path / "o.jsonl")
+    evaluate(tmp_path / "o.jsonl", resume=True)
+    assert (tmp_path / "o.jsonl").read_text() == whole
+    assert not (tmp_path / "o.jsonl.partial").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"seed": 3}, "operator_seed=0, not 3"),
+        ({"first_scene": 7}, "scene_id=1000, not 7"),
+        ({"fps": 5}, "fps=10"),
+    ],
+)
+def test_continuing_with_another_setting_names_it(tmp_path, changes, message):
+    evaluate(tmp_path / "o.jsonl")
+    (tmp_path / "o.jsonl").rename(tmp_path / "o.jsonl.partial")
+    with pytest.raises(ConfigurationError, match=message):
+        evaluate(tmp_path / "o.jsonl", settings=replace(SETTINGS, **changes), resume=True)
