@@ -6,9 +6,5 @@ GYM_IDS = {"Scoop-v0": "lerobot_excav.envs.excavator.env:ExcavatorEnv"}
 """Tasks by name, and the class that plays each."""
 
 for _task, _entry_point in GYM_IDS.items():
-    gym.register(
-        id=f"lerobot_excav/{_task}",
-        entry_point=_entry_point,
-        kwargs={"task": _task},
-        max_episode_steps=200,
-    )
+    # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
+    gym.register(id=f"lerobot_excav/{_task}", entry_point=_entry_point, kwargs={"task": _task})

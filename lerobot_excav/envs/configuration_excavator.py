@@ -9,8 +9,14 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
-from lerobot_excav.envs.settings import require_task, require_worksite_settings
-from lerobot_excav.errors import require
+from lerobot_excav.envs.settings import (
+    RENDER_MODES,
+    require_episode_length,
+    require_integer,
+    require_task,
+    require_worksite_settings,
+)
+from lerobot_excav.errors import require, require_choice
 
 CAMERAS = ("main", "cab", "target_mask")
 STATE_SIZE = 8  # four joint positions [rad], four joint velocities [rad/s]
@@ -28,7 +34,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
     Attributes:
         task: Name of the task in the gym namespace `lerobot_excav`.
         fps: Frames per second of simulated time; divides the 50 ticks of a second.
-        episode_length: Frames after which an unfinished episode is cut off.
+        episode_length: Frames after which an unfinished episode is cut off; None: those of 20 s.
         observation_height: Height of every picture [px].
         observation_width: Width of every picture [px].
         scene_set: Stream of scenes: `train`, `val` or `test`. Evaluations meant for a report use `test`.
@@ -37,12 +43,12 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
         metrics_path: JSON Lines file to which every finished episode is appended; see `envs.metrics_log`.
         metrics_episodes: Number of episodes to write; give it `--eval.n_episodes` when the batch size does
             not divide that, and LeRobot's surplus episodes stay out of the file. None writes all.
-        render_mode: Rendering mode of the environment; LeRobot makes videos from `rgb_array`.
+        render_mode: `rgb_array`, from which LeRobot makes videos, or None.
     """
 
     task: str | None = "Scoop-v0"
     fps: int = 10
-    episode_length: int = 200
+    episode_length: int | None = None
     observation_height: int = 96
     observation_width: int = 128
     scene_set: str = "train"
@@ -50,7 +56,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
     soil: str = "sand"
     metrics_path: Path | None = None
     metrics_episodes: int | None = None
-    render_mode: str = "rgb_array"
+    render_mode: str | None = "rgb_array"
     features: dict[str, PolicyFeature] = field(default_factory=dict)
     features_map: dict[str, str] = field(default_factory=dict)
 
@@ -62,15 +68,11 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
         """
         require_task("env.task", self.task)
         require_worksite_settings(self, prefix="env.", fields=("mask_condition",))
-        require(
-            self.episode_length >= 1,
-            f"env.episode_length={self.episode_length} is not possible; give a number of frames from 1 on.",
-        )
-        require(
-            self.metrics_episodes is None or self.metrics_episodes >= 1,
-            f"env.metrics_episodes={self.metrics_episodes} is not possible; "
-            "give the value of --eval.n_episodes, or leave it out to write every episode.",
-        )
+        require_episode_length("env.episode_length", self.episode_length)
+        require_choice("env.render_mode", self.render_mode, RENDER_MODES)
+        if self.metrics_episodes is not None:
+            hint = "It is the value of --eval.n_episodes; leave it out to write every episode."
+            require_integer("env.metrics_episodes", self.metrics_episodes, 1, hint=hint)
         require(
             self.metrics_episodes is None or self.metrics_path is not None,
             f"env.metrics_episodes={self.metrics_episodes} has no effect without a file; "
@@ -90,16 +92,11 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        """Arguments of `gymnasium.make` besides the id.
-
-        The length is given twice: `lerobot-eval` reads it from Gymnasium's time limit, and the environment
-        itself must know its last frame to hand out the metrics of the episode.
-        """
+        """Arguments of `gymnasium.make` besides the id."""
         return {
             "task": self.task,
             "fps": self.fps,
             "episode_length": self.episode_length,
-            "max_episode_steps": self.episode_length,
             "observation_height": self.observation_height,
             "observation_width": self.observation_width,
             "scene_set": self.scene_set,

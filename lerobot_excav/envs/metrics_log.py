@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, require
 
 
 class MetricsLog:
@@ -76,9 +76,17 @@ class MetricsLog:
         Args:
             env_index: Position of the environment in the batch.
             info: Information of the last step: `is_success`, `scene_id`, `target_id`, `episode_metrics`.
+
+        Raises:
+            ConfigurationError: The environment did not end the episode itself, so there are no metrics.
         """
         if self._batch < 0 or env_index in self._finished:
             return
+        require(
+            "episode_metrics" in info,
+            "env.metrics_path needs info['episode_metrics'] at the end of an episode, and it is missing; "
+            "set the length by episode_length, not by max_episode_steps or a TimeLimit of Gymnasium's.",
+        )
         self._finished[env_index] = self._line(env_index, info)
         if len(self._finished) == self._n_envs:
             self._append([self._finished[i] for i in range(self._n_envs)])

@@ -5,6 +5,7 @@ names of the soil presets are repeated here; a test keeps them equal.
 """
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 from lerobot_excav.envs import GYM_IDS
@@ -15,6 +16,8 @@ MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
 SOILS = ("sand", "gravel", "dirt", "wet_sand")
 TARGETS_PER_SCENE = 4
 TICKS_PER_SECOND = 50
+EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
+RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
 
 _CHOICES = {"scene_set": SCENE_SETS, "mask_condition": MASK_CONDITIONS, "soil": SOILS}
@@ -29,6 +32,27 @@ def require_task(field: str, task: str | None) -> None:
     require_choice(field, task, tuple(GYM_IDS), hint="A task is a gym id without the part before the slash.")
 
 
+def require_integer(field: str, value: Any, low: int, high: int | None = None, *, hint: str = "") -> None:
+    """Raise unless a value is a whole number within limits; a truth value is none.
+
+    Args:
+        field: Name of the setting as its user writes it.
+        value: The value given.
+        low: Least allowed value.
+        high: Greatest allowed value; None for no limit.
+        hint: Next step, added to the message.
+
+    Raises:
+        ConfigurationError: `value` is no whole number from `low` to `high`.
+    """
+    is_integer = isinstance(value, Integral) and not isinstance(value, bool)
+    limits = f"from {low} on" if high is None else f"from {low} to {high}"
+    require(
+        is_integer and value >= low and (high is None or value <= high),
+        f"{field}={value!r} is not possible; give a whole number {limits}. {hint}".rstrip(),
+    )
+
+
 def require_fps(field: str, fps: int) -> None:
     """Raise unless a frame lasts a whole number of ticks of 0.02 s.
 
@@ -36,7 +60,20 @@ def require_fps(field: str, fps: int) -> None:
         ConfigurationError: `fps` does not divide 50.
     """
     divisors = tuple(n for n in range(1, TICKS_PER_SECOND + 1) if TICKS_PER_SECOND % n == 0)
-    require_choice(field, fps, divisors, hint="A frame is a whole number of ticks of 0.02 s.")
+    hint = f"A frame is a whole number of ticks of 0.02 s: {', '.join(map(str, divisors))}."
+    require_integer(field, fps, 1, TICKS_PER_SECOND, hint=hint)
+    require_choice(field, fps, divisors, hint=hint)
+
+
+def require_episode_length(field: str, frames: int | None) -> None:
+    """Raise unless an episode may have this length; None stands for `EPISODE_DURATION_S`.
+
+    Raises:
+        ConfigurationError: The length is no whole number from 1 on.
+    """
+    if frames is not None:
+        hint = f"It counts frames; leave it out for {EPISODE_DURATION_S:g} s."
+        require_integer(field, frames, 1, hint=hint)
 
 
 def require_image_size(field: str, size_px: int) -> None:
@@ -45,11 +82,7 @@ def require_image_size(field: str, size_px: int) -> None:
     Raises:
         ConfigurationError: The size is outside `IMAGE_SIZE_LIMITS`.
     """
-    least, most = IMAGE_SIZE_LIMITS
-    require(
-        least <= size_px <= most,
-        f"{field}={size_px} is out of range; allowed: {least} to {most} pixels; the default is 96 x 128.",
-    )
+    require_integer(field, size_px, *IMAGE_SIZE_LIMITS, hint="It counts pixels; the default is 96 x 128.")
 
 
 def require_worksite_settings(config: Any, *, prefix: str, fields: Sequence[str] = ()) -> None:

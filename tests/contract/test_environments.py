@@ -180,6 +180,16 @@ def test_an_episode_lasts_at_least_a_frame_and_ends_with_its_metrics(gym_id: str
     env.close()
 
 
+def test_gym_make_plays_an_episode_to_the_length_asked_for(gym_id: str) -> None:
+    env = gym.make(gym_id, episode_length=201, obs_type="agent_pos", disable_env_checker=True)
+    env.reset(seed=4)
+    still = np.zeros(env.action_space.shape, np.float32)  # type: ignore[arg-type]
+    ends = [env.step(still)[3:] for _ in range(201)]
+    assert [truncated for truncated, _ in ends] == [False] * 200 + [True]
+    assert ends[-1][1]["episode_metrics"]["frames"] == 201
+    env.close()
+
+
 @pytest.mark.parametrize(
     "spoil",
     [lambda a: a[:-1], lambda a: a[None], lambda a: a * np.nan, lambda a: a + np.inf],

@@ -10,6 +10,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.envs.utils import env_to_policy_features
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
+from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.errors import ConfigurationError
 
 
@@ -48,7 +49,13 @@ def test_feature_names_can_be_recorded() -> None:
         ("scene_set", "exam", "'train', 'val', 'test'"),
         ("mask_condition", "none", "'correct', 'zero', 'random', 'mismatched'"),
         ("soil", "lava", "'sand', 'gravel', 'dirt', 'wet_sand'"),
+        ("fps", True, "10, 25"),
+        ("fps", 10.0, "10, 25"),
+        ("observation_height", 96.0, "32 to 1024"),
+        ("render_mode", "human", "'rgb_array', None"),
         ("episode_length", 0, "from 1 on"),
+        ("episode_length", 20.5, "from 1 on"),
+        ("metrics_episodes", True, "--eval.n_episodes"),
         ("metrics_episodes", 0, "--eval.n_episodes"),
         ("metrics_episodes", 5, "--env.metrics_path"),
     ],
@@ -58,6 +65,17 @@ def test_an_impossible_value_is_named_with_what_is_allowed(field: str, value: ob
         ExcavatorEnvConfig(**{field: value})
     assert f"env.{field}={value!r}" in str(raised.value)
     assert allowed in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("fps", 12), ("fps", True), ("observation_width", 8), ("episode_length", 2.0)]
+)
+def test_the_environment_objects_in_the_same_words(field: str, value: object) -> None:
+    with pytest.raises(ConfigurationError) as from_config:
+        ExcavatorEnvConfig(**{field: value})
+    with pytest.raises(ConfigurationError) as from_env:
+        ExcavatorEnv(**{field: value})  # type: ignore[arg-type]
+    assert str(from_config.value) == f"env.{from_env.value}"
 
 
 def test_every_setting_reaches_the_environment() -> None:
@@ -72,7 +90,7 @@ def test_every_setting_reaches_the_environment() -> None:
         "soil": "gravel",
     }
     config = ExcavatorEnvConfig(**settings)
-    assert config.gym_kwargs == {**settings, "max_episode_steps": 30, "render_mode": "rgb_array"}
+    assert config.gym_kwargs == {**settings, "render_mode": "rgb_array"}
     assert config.gym_id == "lerobot_excav/Scoop-v0"
 
 

@@ -81,6 +81,12 @@ def test_numpy_values_become_plain_and_missing_numbers_null(log: MetricsLog) -> 
     assert (line["mass_kg"], line["contacts"], line["distance_m"], line["phase"]) == (0.5, 2, None, "dump")
 
 
+def test_an_episode_without_metrics_is_refused(log: MetricsLog) -> None:
+    log.begin_batch([7, 8])
+    with pytest.raises(ConfigurationError, match=r"episode_metrics.*episode_length"):
+        log.finish_episode(0, {"is_success": False})
+
+
 def test_an_existing_file_is_appended_to(log: MetricsLog) -> None:
     log.path.write_text('{"earlier": 1}\n')
     log.begin_batch([7, 8])

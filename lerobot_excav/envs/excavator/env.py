@@ -14,17 +14,22 @@ from lerobot_excav.envs.excavator.scene import Scene, draw_scene
 from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
 from lerobot_excav.envs.settings import (
+    EPISODE_DURATION_S,
     MASK_CONDITIONS,
+    RENDER_MODES,
     SCENE_SETS,
     SOILS,
     TARGETS_PER_SCENE,
     TICKS_PER_SECOND,
+    require_episode_length,
     require_fps,
     require_image_size,
+    require_integer,
     require_task,
 )
-from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.errors import ConfigurationError, require_choice
 
+RESET_OPTIONS = ("scene_id", "target_id")
 OBS_TYPES = ("pixels_agent_pos", "agent_pos")
 TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
 
@@ -39,7 +44,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
 
     Scene and randomisation: pile shape and mass, colours, light, initial joint angles and the four targets come from
     `scene_set` and `scene_id`. `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`;
-    `reset(options={"scene_id": …, "target_id": …})` selects directly. A reset with neither draws a scene.
+    `reset(options={"scene_id": …, "target_id": …})` selects directly, without a target `scene_id % 4`. A reset with
+    neither draws a scene.
 
     Observation:
 
@@ -61,16 +67,17 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     Termination: the cycle is complete (bucket emptied into the box). Truncation: the time limit `episode_length`.
 
     Args:
-        task: One of `settings.TASKS`.
+        task: One of `envs.GYM_IDS`.
         obs_type: `pixels_agent_pos`, or `agent_pos` to leave the pictures out (several times faster).
         observation_height: Image height H [px].
         observation_width: Image width W [px].
         scene_set: `train`, `val` or `test`.
         mask_condition: Which mask is shown, see `mask_condition.py`.
         fps: Frames per second; divides 50.
-        episode_length: Time limit in frames.
+        episode_length: Time limit in frames; None: those of 20 s.
         soil: Name of the soil preset.
         render_mode: `rgb_array` or None.
+        depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - gymnasium's contract
@@ -85,24 +92,27 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         scene_set: str = "train",
         mask_condition: str = "correct",
         fps: int = 10,
-        episode_length: int = 200,
+        episode_length: int | None = None,
         soil: str = "sand",
         render_mode: str | None = "rgb_array",
+        depth_info: bool = False,
     ) -> None:
         require_task("task", task)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
         require_choice("soil", soil, SOILS)
-        require_choice("render_mode", render_mode, ("rgb_array", None))
+        require_choice("render_mode", render_mode, RENDER_MODES)
         require_fps("fps", fps)
         require_image_size("observation_height", observation_height)
         require_image_size("observation_width", observation_width)
-        require(episode_length >= 1, f"episode_length={episode_length} must be at least 1 frame")
+        require_episode_length("episode_length", episode_length)
         self.task, self.task_description = task, TASK_DESCRIPTION
         self.scene_set, self.mask_condition, self.soil_name = scene_set, mask_condition, soil
-        self.fps, self.episode_length = fps, episode_length
-        self.obs_type, self.render_mode = obs_type, render_mode
+        self.fps = fps
+        self.episode_length = round(EPISODE_DURATION_S * fps) if episode_length is None else episode_length
+        self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
+        self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self.observation_size = (observation_height, observation_width)
         self.observation_space = _observation_space(self.observation_size, obs_type)
@@ -161,13 +171,13 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
 
         Args:
             seed: Also seeds the corruption of the mask.
-            options: May hold `scene_id` and `target_id`; other keys are left to those who set them.
+            options: May hold `scene_id` and `target_id`, and LeRobot's own keys, which begin with `lerobot_`.
 
         Returns:
             Observation and info.
 
         Raises:
-            ConfigurationError: `scene_id` or `target_id` is out of range.
+            ConfigurationError: `scene_id` or `target_id` is no integer or out of range, or an option is unknown.
         """
         super().reset(seed=seed)
         scene_id, target_id = self._select(seed, options or {})
@@ -196,7 +206,6 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             cycle.is_success
         )
         terminated = cycle.is_complete
-        # The wrapper of gym.make says the same; this keeps an environment built by hand finite, too.
         truncated = self._frame >= self.episode_length and not terminated
         info = self._info()
         if terminated or truncated:
@@ -221,11 +230,15 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
 
     def _select(self, seed: int | None, options: dict[str, Any]) -> tuple[int, int]:
         """Choose scene and target from options, else seed, else by chance."""
+        for key in options:
+            if not key.startswith("lerobot_"):
+                require_choice("options", key, RESET_OPTIONS)
         number = int(self.np_random.integers(2**31)) if seed is None else seed
-        scene_id = int(options.get("scene_id", number))
-        target_id = int(options.get("target_id", number % TARGETS_PER_SCENE))
-        require_choice("target_id", target_id, range(TARGETS_PER_SCENE))
-        return scene_id, target_id
+        scene_id = options.get("scene_id", number)
+        require_integer("scene_id", scene_id, 0, 2**63 - 1)
+        target_id = options.get("target_id", scene_id % TARGETS_PER_SCENE)
+        require_integer("target_id", target_id, 0, TARGETS_PER_SCENE - 1)
+        return int(scene_id), int(target_id)
 
     def _draw_mask(self, scene: Scene, target_id: int) -> NDArray[np.uint8]:
         points_w = self.renderer.terrain_points_w(self.worksite.soil)
@@ -247,12 +260,13 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         return observation
 
     def _info(self) -> dict[str, Any]:
-        return {
+        info = {
             "is_success": self.cycle.is_success,
             "task_state": self.cycle.state.as_array(),
             "scene_id": self.scene.scene_id,
             "target_id": self.target_id,
         }
+        return info | {"depth_m": self.depth_m()} if self.depth_info else info
 
     def _episode_metrics(self) -> dict[str, Any]:
         return {

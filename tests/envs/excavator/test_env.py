@@ -35,6 +35,28 @@ def test_options_select_scene_and_target_over_the_seed(env):
     assert (info["scene_id"], info["target_id"]) == (3, 1)
 
 
+def test_a_scene_without_a_target_takes_the_one_of_its_seed(env):
+    _, info = env.reset(seed=1006, options={"scene_id": 7})
+    assert (info["scene_id"], info["target_id"]) == (7, 3)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"scene_id": 1.5}, r"scene_id=1\.5"),
+        ({"scene_id": "3"}, "scene_id='3'"),
+        ({"scene_id": -1}, "scene_id=-1 .*from 0"),
+        ({"scene_id": 2**63}, "scene_id=9223372036854775808"),
+        ({"target_id": True}, "target_id=True"),
+        ({"target_id": 4}, "target_id=4 .*from 0 to 3"),
+        ({"scene": 3}, "options='scene' .*'scene_id', 'target_id'"),
+    ],
+)
+def test_unusable_options_are_refused(env, options, named):
+    with pytest.raises(ConfigurationError, match=named):
+        env.reset(options=options)
+
+
 def test_unseeded_resets_draw_new_scenes(env):
     env.reset(seed=0)
     assert env.reset()[1]["scene_id"] != env.reset()[1]["scene_id"]
@@ -91,6 +113,11 @@ def test_time_limit_truncates_and_hands_out_the_metrics():
     assert info["episode_metrics"]["is_success"] is False
 
 
+@pytest.mark.parametrize(("fps", "frames"), [(10, 200), (25, 500)])
+def test_an_episode_lasts_20_s_unless_told(fps, frames):
+    assert ExcavatorEnv(fps=fps, obs_type="agent_pos").episode_length == frames
+
+
 @pytest.mark.parametrize(
     ("kwargs", "named"),
     [
@@ -103,6 +130,7 @@ def test_time_limit_truncates_and_hands_out_the_metrics():
         ({"obs_type": "state"}, "'agent_pos'"),
         ({"render_mode": "human"}, "'rgb_array'"),
         ({"episode_length": 0}, "episode_length=0"),
+        ({"episode_length": True}, "episode_length=True"),
     ],
 )
 def test_bad_settings_name_the_field_and_what_is_allowed(kwargs, named):
@@ -174,6 +202,21 @@ def test_render_and_depth_are_registered_with_main(seeing_env):
     assert depth_m.shape == observation["pixels"]["main"].shape[:2]
     assert np.isfinite(depth_m).all()
     assert ExcavatorEnv(obs_type="agent_pos", render_mode=None).render() is None
+
+
+def test_depth_comes_with_the_info_on_request(seeing_env):
+    observation, info = seeing_env.reset(seed=2)
+    assert "depth_m" not in info
+    env = ExcavatorEnv(depth_info=True)
+    same, info = env.reset(seed=2)
+    start_m = info["depth_m"]
+    assert np.array_equal(same["pixels"]["main"], observation["pixels"]["main"])
+    assert (start_m.shape, start_m.dtype) == ((96, 128), np.float32)
+    assert np.array_equal(start_m, env.depth_m())
+    moved_m = env.step(np.ones(4))[4]["depth_m"]
+    assert np.array_equal(moved_m, env.depth_m())
+    assert not np.array_equal(moved_m, start_m)
+    env.close()
 
 
 def test_successful_cycle_pays_its_soil_and_one_for_success(env):
