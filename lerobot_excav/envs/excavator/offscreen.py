@@ -18,11 +18,6 @@ def default_backend() -> str:
     return "egl" if sys.platform == "linux" and not has_display else "glfw"
 
 
-# MuJoCo reads the variable when it is first imported; without it, it would ask for a window that nobody has.
-if default_backend() == "egl":
-    os.environ.setdefault("MUJOCO_GL", "egl")
-
-
 def create_context(width: int, height: int) -> Any:
     """Create an OpenGL context that draws off screen and make it current.
 

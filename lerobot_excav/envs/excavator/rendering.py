@@ -2,18 +2,13 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.offscreen import (
-    create_context,  # before MuJoCo: it picks the OpenGL backend
-)
-
-# isort: split
-import mujoco
-
 from lerobot_excav.envs.excavator.bodywork import MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
+from lerobot_excav.envs.excavator.offscreen import create_context
 from lerobot_excav.envs.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.excavator.constants import BUCKET_INNER_WIDTH_M
 from lerobot_excav.envs.excavator.layout import cylinder_from_world, world_from_cylinder
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import ExcavError
@@ -16,9 +17,8 @@ PATCH_SIZE_M = 0.8
 RADIUS_RANGE_M = (3.5, 5.9)
 LEAST_MEAN_HEIGHT_M = 0.38
 LEAST_DISTANCE_M = 1.0
-DIG_WIDTH_M = 0.72
 DIG_LENGTH_M = 1.4
-DIG_DEPTH_M = 0.55
+CUT_DEPTH_M = 0.55
 LEAST_DIGGABLE_M3 = 0.40
 
 
@@ -135,9 +135,9 @@ def _feasible_targets(
 def _has_enough_soil(
     target: Target, heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
 ) -> bool:
-    patch = _sample(heights_m, x_w, y_w, target, (-0.4, 0.4))
+    patch = _sample(heights_m, x_w, y_w, target, (-PATCH_SIZE_M / 2, PATCH_SIZE_M / 2))
     dig_path = _sample(heights_m, x_w, y_w, target, (-DIG_LENGTH_M, 0.1))
-    diggable_m3 = np.minimum(dig_path, DIG_DEPTH_M).mean() * DIG_WIDTH_M * (DIG_LENGTH_M + 0.1)
+    diggable_m3 = np.minimum(dig_path, CUT_DEPTH_M).mean() * BUCKET_INNER_WIDTH_M * (DIG_LENGTH_M + 0.1)
     return bool(patch.mean() >= LEAST_MEAN_HEIGHT_M and diggable_m3 >= LEAST_DIGGABLE_M3)
 
 
@@ -151,7 +151,7 @@ def _sample(
     """Heights at the nearest cells of a strip of bucket width along the dig direction [m], shape (12, 5)."""
     radius, swing, _ = cylinder_from_world(target.center_w)
     along = radius + np.linspace(*along_range_m, 12)
-    across = np.linspace(-0.36, 0.36, 5)
+    across = np.linspace(-BUCKET_INNER_WIDTH_M / 2, BUCKET_INNER_WIDTH_M / 2, 5)
     points = world_from_cylinder(along[:, None], swing + across[None, :] / radius)
     cell = float(x_w[1] - x_w[0])
     ix = np.clip(np.rint((points[..., 0] - x_w[0]) / cell).astype(int), 0, x_w.size - 1)

@@ -117,10 +117,10 @@ def distance_to_box_m(point_w: NDArray[np.float64]) -> float:
 
 
 def depth_below_dig_plane_m(tool: Tool) -> float:
-    """Return how far the bucket reaches below the dig plane z = 0 inside the dig area [m].
+    """Return how far the bucket's bounding box reaches below the dig plane z = 0 inside the dig area [m].
 
-    The greatest depth over a 5 x 5 x 5 sample of the bucket's bounding box, faded out over `FOOTPRINT_FADE_M` to both
-    sides of the edge of the dig area.
+    The greatest depth over a 5 x 5 x 5 sample of the box, faded out over `FOOTPRINT_FADE_M` to both sides of the edge
+    of the dig area. The box and not the shell, as in the definition this follows: its corners reach deeper.
     """
     profile = tool.geometry.profile_t
     low, high = profile.min(axis=0), profile.max(axis=0)

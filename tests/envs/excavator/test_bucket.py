@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.excavator import constants as const
-from lerobot_excav.envs.excavator.bucket import (
-    bucket_geometry,
-    cross_section_m2,
-    heaped_volume_m3,
-    struck_volume_m3,
-)
+from lerobot_excav.envs.excavator.bucket import bucket_geometry, heaped_volume_m3
 
 
 def test_heaped_volume_is_that_of_the_datasheet():
@@ -16,9 +11,11 @@ def test_heaped_volume_is_that_of_the_datasheet():
 
 def test_struck_volume_follows_from_the_cross_section():
     geometry = bucket_geometry()
-    assert cross_section_m2(geometry.profile_t) == pytest.approx(0.359, abs=0.001)
-    assert struck_volume_m3(geometry) == pytest.approx(0.2584, abs=0.001)
-    assert struck_volume_m3(geometry) == pytest.approx(geometry.struck_volume_m3)
+    x, z = geometry.profile_t.T
+    area_m2 = -np.trapezoid(z, x)  # from the edge at large x to the lip
+    assert area_m2 == pytest.approx(0.359, abs=0.001)
+    assert geometry.struck_volume_m3 == pytest.approx(area_m2 * geometry.inner_width_m)
+    assert geometry.struck_volume_m3 == pytest.approx(0.2584, abs=0.001)
 
 
 def test_full_scoop_of_sand_weighs_as_much_as_published():
@@ -32,7 +29,7 @@ def test_heap_equals_its_numerical_integral():
     y = (np.arange(400) + 0.5) / 400 * geometry.inner_width_m
     from_sides = np.minimum.outer(np.minimum(x, length - x), np.minimum(y, geometry.inner_width_m - y))
     heap = from_sides.mean() * length * geometry.inner_width_m
-    assert heaped_volume_m3(geometry) - struck_volume_m3(geometry) == pytest.approx(heap, rel=1e-4)
+    assert heaped_volume_m3(geometry) - geometry.struck_volume_m3 == pytest.approx(heap, rel=1e-4)
 
 
 def test_edge_and_lip_lie_on_the_opening_line():

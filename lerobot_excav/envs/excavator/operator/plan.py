@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.excavator.constants import BUCKET_INNER_WIDTH_M
 from lerobot_excav.envs.excavator.layout import TARGET_BOX, cylinder_from_world, world_from_cylinder
 from lerobot_excav.envs.excavator.operator.path import BucketPose, line
 from lerobot_excav.envs.excavator.operator.variation import Variation
@@ -12,7 +13,6 @@ from lerobot_excav.envs.excavator.targets import Target
 from lerobot_excav.envs.soil import Soil
 
 # Numbers of the plan (kind: tuned on train scenes).
-BUCKET_WIDTH_M = 0.72
 HOVER_HEIGHT_M = 0.45
 FLOOR_CLEARANCE_M = 0.06
 ENTRY_LENGTH_M = 0.35
@@ -132,7 +132,7 @@ def _cut_heights(
     for extra_m in np.arange(0.0, 0.45, 0.05):
         heights = np.maximum(surface_m - (depth_m + extra_m) * ramp, FLOOR_CLEARANCE_M)
         heights = np.minimum(heights, surface_m + FLOOR_CLEARANCE_M)
-        swept_m3 = np.cumsum(np.maximum(surface_m - heights, 0.0)) * CUT_STEP_M * BUCKET_WIDTH_M
+        swept_m3 = np.cumsum(np.maximum(surface_m - heights, 0.0)) * CUT_STEP_M * BUCKET_INNER_WIDTH_M
         enough = np.nonzero(swept_m3 >= volume_m3)[0]
         if enough.size:
             return np.asarray(heights[: max(int(enough[0]) + 1, 3)])
