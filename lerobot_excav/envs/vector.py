@@ -12,7 +12,7 @@ from typing import Any
 
 import gymnasium as gym
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from lerobot.envs.utils import freeze_after_episode_end
+from lerobot.envs.utils import NEW_ROLLOUT_OPTION, freeze_after_episode_end
 
 from lerobot_excav.envs.metrics_log import MetricsLog
 from lerobot_excav.errors import require
@@ -54,10 +54,10 @@ class _LoggedVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     metrics_log: MetricsLog | None = None
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Reset every environment; begins a batch of the metrics log."""
+        """Reset every environment, ended or not; begins a batch of the metrics log."""
         if self.metrics_log is not None:
             self.metrics_log.begin_batch(_seed_of_each(seed, self.num_envs))
-        return super().reset(seed=seed, options=options)
+        return super().reset(seed=seed, options={**(options or {}), NEW_ROLLOUT_OPTION: True})
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step every environment; hands the episodes that end to the metrics log."""

@@ -155,6 +155,14 @@ def test_environments_in_processes_of_their_own_count_the_same(run: Callable[...
     assert run(2, use_async=True) == run(1)
 
 
+@pytest.mark.parametrize("use_async", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_lerobot_learns_the_length(*, use_async: bool) -> None:
+    config = ExcavatorEnvConfig(episode_length=7)
+    env = config.create_envs(2, use_async_envs=use_async)["excavator"][0]
+    assert env.call("_max_episode_steps") == (7, 7)
+    env.close()
+
+
 def test_surplus_episodes_are_recognisable(run: Callable[..., Any]) -> None:
     counted, lines = run(3, max_episodes=None)
     assert [line["episode_ix"] for line in lines] == [0, 1, 2, 3, 4, 5]
@@ -172,6 +180,26 @@ def test_a_finished_environment_costs_nothing_and_repeats_its_end() -> None:
     assert rewards == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
     assert lefts == [2.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     env.close()
+
+
+def test_a_plain_reset_begins_a_new_batch(tmp_path: Path) -> None:
+    path = tmp_path / "metrics.jsonl"
+    config = ExcavatorEnvConfig(
+        observation_height=32, observation_width=48, episode_length=2, metrics_path=path
+    )
+    env = config.create_envs(1)["excavator"][0]
+    still = np.zeros((1, 4), np.float32)
+    scenes = []
+    for batch in range(2):
+        _, info = env.reset()
+        scenes.append(int(info["scene_id"][0]))
+        env.step(still)
+        assert len(path.read_text().splitlines()) == batch
+        env.step(still)
+    env.close()
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert scenes[0] != scenes[1]
+    assert [(line["episode_ix"], line["scene_id"]) for line in lines] == list(enumerate(scenes))
 
 
 def test_info_of_env_leaves_out_what_another_environment_said() -> None:
