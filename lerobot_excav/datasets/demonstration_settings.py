@@ -108,8 +108,14 @@ class DemonstrationSettings:
         for field in fields(self):
             mine, theirs = getattr(self, field.name), getattr(other, field.name)
             if mine != theirs:
-                option = field.name.replace("_", "-")
-                raise ConfigurationError(
-                    f"--{option}={mine} differs from the started run, which has {theirs}; "
-                    f"continue it with --{option}={theirs}, or choose another --out"
-                )
+                raise ConfigurationError(_difference(field.name.replace("_", "-"), mine, theirs))
+
+
+def _difference(option: str, mine: Any, theirs: Any) -> str:
+    if isinstance(mine, bool):
+        has, do = ("has", "with") if theirs else ("does not have", "without")
+        return f"the started run {has} --{option}; continue it {do} --{option}, or choose another --out"
+    return (
+        f"--{option}={mine} differs from the started run, which has {theirs}; "
+        f"continue it with --{option}={theirs}, or choose another --out"
+    )

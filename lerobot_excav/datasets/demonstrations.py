@@ -21,7 +21,7 @@ from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.provenance import read_provenance, write_provenance
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.simulation import simulate_episode
-from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.datasets.workers import episode_result, require_workers, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
 
 Outcome = dict[str, Any]
@@ -70,8 +70,9 @@ def record_demonstrations(
 
     Raises:
         DatasetError: `out` exists, an interrupted run is in the way, or no episode is worth keeping.
-        ConfigurationError: A started run has other settings.
+        ConfigurationError: `workers` is negative, or a started run has other settings.
     """
+    require_workers(workers)
     start = time.monotonic()
     if out.exists():
         outcomes = _require_finished(out, settings, resume=resume)
@@ -121,7 +122,8 @@ def _fill(
     if not any(outcome["kept"] for outcome in outcomes):
         raise DatasetError(
             f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; "
-            "look at them with --keep-failures (the time limit is --episode-length)"
+            f"to look at them, remove {partial.folder} and record again with --keep-failures "
+            "(the time limit is --episode-length)"
         )
     dataset.finalize()
     shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders

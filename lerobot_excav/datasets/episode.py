@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.datasets.schema import CAMERAS
+from lerobot_excav.envs.features import CAMERAS
 
 
 class Environment(Protocol):

@@ -6,7 +6,6 @@ import numpy as np
 
 from lerobot_excav.datasets.episode_table import EpisodeTable
 from lerobot_excav.datasets.schema import MASK_KEY, STATE_KEY, TASK_STATE_KEY, camera_key
-from lerobot_excav.errors import DatasetError
 
 MAIN_KEY = camera_key("main")
 
@@ -23,10 +22,6 @@ def episode_problems(episode: EpisodeTable) -> list[str]:
     Returns:
         Problems, in plain words; empty if there is none.
     """
-    try:
-        _ = episode.pair, episode.success
-    except DatasetError as error:
-        return [str(error)]
     return [*_number_problems(episode), *_mask_problems(episode)]
 
 

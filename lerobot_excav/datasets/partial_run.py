@@ -18,16 +18,19 @@ class PartialRun:
         settings: Settings of the run.
         resume: Whether a started run may be continued.
 
+    Attributes:
+        folder: The partial folder.
+
     Raises:
         DatasetError: A started run lies there and `resume` is false, or another process is at it.
         ConfigurationError: The started run has other settings.
     """
 
     def __init__(self, out: Path, settings: DemonstrationSettings, *, resume: bool) -> None:
-        self._folder = _folder(out)
-        if self._folder.exists() and not resume:
+        self.folder = _folder(out)
+        if self.folder.exists() and not resume:
             raise DatasetError(
-                f"{self._folder} holds an interrupted run; continue it with --resume, or remove the folder"
+                f"{self.folder} holds an interrupted run; continue it with --resume, or remove the folder"
             )
         self.episodes.mkdir(parents=True, exist_ok=True)
         self._lock = self._take_lock()
@@ -38,12 +41,12 @@ class PartialRun:
     @property
     def episodes(self) -> Path:
         """Folder of the finished episodes."""
-        return self._folder / "episodes"
+        return self.folder / "episodes"
 
     @property
     def dataset(self) -> Path:
         """Folder of the growing dataset."""
-        return self._folder / "dataset"
+        return self.folder / "dataset"
 
     def __enter__(self) -> "PartialRun":
         return self
@@ -58,16 +61,16 @@ class PartialRun:
 
     def _take_lock(self) -> IO[Any]:
         # The system lets go of it when the process ends, however it ends.
-        lock = (self._folder / "lock").open("w")
+        lock = (self.folder / "lock").open("w")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             lock.close()
-            raise DatasetError(f"another process is writing {self._folder}; wait for it or stop it") from None
+            raise DatasetError(f"another process is writing {self.folder}; wait for it or stop it") from None
         return lock
 
     def _match_settings(self, settings: DemonstrationSettings) -> None:
-        path = self._folder / "settings.json"
+        path = self.folder / "settings.json"
         try:
             started = DemonstrationSettings.from_dict(json.loads(path.read_text()))
         except (FileNotFoundError, json.JSONDecodeError):

@@ -184,6 +184,10 @@ def _put_in_place(temporary: Path, root: Path, out: Path | None) -> Path:
         return out
     original = temporary.with_name(f"{temporary.name}.original")
     root.rename(original)
-    temporary.rename(root)
+    try:
+        temporary.rename(root)
+    except OSError:
+        original.rename(root)
+        raise
     shutil.rmtree(original)
     return root

@@ -9,13 +9,10 @@ are ordinary per-frame columns, the only carrier that survives delete, split, me
 from typing import Any
 
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
+from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.errors import DatasetError
 
 ROBOT_TYPE = "excavator_sim"
-JOINTS = ("swing", "boom", "arm", "bucket")
-CAMERAS = ("main", "cab", "target_mask")
-ACTION_NAMES = tuple(f"{joint}.vel" for joint in JOINTS)
-STATE_NAMES = (*(f"{joint}.pos" for joint in JOINTS), *ACTION_NAMES)
 
 STATE_KEY = "observation.state"
 ACTION_KEY = "action"

@@ -18,6 +18,17 @@ from lerobot_excav.errors import ExcavError, require
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS"), "1")
 
 
+def require_workers(workers: int) -> None:
+    """Check a number of worker processes.
+
+    Raises:
+        ConfigurationError: It is negative.
+    """
+    require(
+        workers >= 0, f"--workers={workers} must not be negative; 0 works in this process, 2 in two others"
+    )
+
+
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Executor]:
     """Provide an executor of worker processes; what is not yet started is cancelled when the block ends.
@@ -28,7 +39,7 @@ def worker_pool(workers: int) -> Iterator[Executor]:
     Raises:
         ConfigurationError: `workers` is negative.
     """
-    require(workers >= 0, f"workers={workers} must not be negative; 0 works in this process, 2 in two others")
+    require_workers(workers)
     if workers == 0:
         yield InProcessExecutor()
         return

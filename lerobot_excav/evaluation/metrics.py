@@ -64,14 +64,12 @@ class Evaluation:
 
     Attributes:
         path: The file.
-        number: Which evaluation of the file, from 1; LeRobot appends one after the other.
-        of: How many the file holds.
+        of: How many evaluations the file holds; LeRobot appends one after the other, and this is the last.
         operator: Who dug, if the file says so: `scripted`, `human`, or None for a policy.
         episodes: Outcomes by scene and target.
     """
 
     path: Path
-    number: int
     of: int
     operator: str | None
     episodes: dict[EpisodeKey, EpisodeMetrics]
@@ -101,7 +99,6 @@ def read_evaluation(path: Path) -> Evaluation:
     last = evaluations[-1]
     return Evaluation(
         path=path,
-        number=len(evaluations),
         of=len(evaluations),
         operator=last[0][1].get("operator"),
         episodes=_by_key(last),

@@ -1,4 +1,4 @@
-"""Rebuild the paired-scene index of a dataset and use it.
+r"""Rebuild the paired-scene index of a dataset and use it.
 
 The index (meta/excav_pairs.parquet, one row per episode) is derived from the dataset's own columns; rebuild it after
 every edit. With --select and --split it prints the flags that make stock lerobot-train use exactly those episodes.
@@ -10,7 +10,8 @@ Examples:
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
   lerobot-excav index outputs/paired --split=scene --eval-fraction=0.2
       hold out a fifth of the scenes, with all their episodes
-  lerobot-train ... $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags)
+  lerobot-train ... --eval_steps=500 \
+      $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags)
       train on one episode of each of 40 scenes
 """
 
@@ -23,6 +24,8 @@ from lerobot_excav.datasets.pair_coverage import PairCoverage, pair_coverage
 from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.split import SPLIT_UNITS, Split, split
 from lerobot_excav.errors import require
+
+DEFAULT_EVAL_FRACTION = 0.2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,8 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--scenes", type=int, help="how many scenes, for paired and non-paired")
     group.add_argument("--include-failures", action="store_true", help="also choose episodes without success")
     group.add_argument("--split", choices=SPLIT_UNITS, help="hold out whole scenes, or single episodes")
-    group.add_argument("--eval-fraction", type=float, default=0.2, help="part to hold out (default: 0.2)")
-    group.add_argument("--seed", type=int, default=0, help="seed of choice and split (default: 0)")
+    group.add_argument(
+        "--eval-fraction", type=float, help=f"part to hold out (default: {DEFAULT_EVAL_FRACTION})"
+    )
+    group.add_argument("--seed", type=int, help="seed of choice and split (default: 0)")
     group.add_argument("--flags", action="store_true", help="print nothing but the flags, for $(...)")
 
 
@@ -49,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Complete, rebuild, choose, and say what came of it."""
     from lerobot_excav.datasets.paired_index import INDEX_PATH, write_index
 
-    require(arguments.out is None or arguments.session is not None, "--out is of use with --session only")
+    _require_options_with_effect(arguments)
     root = arguments.dataset
     if arguments.session is not None:
         from lerobot_excav.datasets.resimulation import complete_recording
@@ -62,6 +67,19 @@ def run(arguments: argparse.Namespace) -> int:
     if _asks_for_episodes(arguments):
         _print_flags(arguments, root, index)
     return 0
+
+
+def _require_options_with_effect(arguments: argparse.Namespace) -> None:
+    require(arguments.out is None or arguments.session is not None, "--out is of use with --session only")
+    require(
+        arguments.eval_fraction is None or arguments.split is not None,
+        f"--eval-fraction={arguments.eval_fraction} has no effect without --split; add --split=scene",
+    )
+    chooses = arguments.select != "all" or arguments.episodes is not None or arguments.split is not None
+    require(
+        arguments.seed is None or chooses,
+        f"--seed={arguments.seed} has no effect without a choice; add --select, --episodes or --split",
+    )
 
 
 def _asks_for_episodes(arguments: argparse.Namespace) -> bool:
@@ -84,14 +102,14 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
 
 
 def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame) -> None:
+    seed = arguments.seed or 0
     rows = usable(index, include_failures=arguments.include_failures)
-    rows = select(
-        rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=arguments.seed
-    )
+    rows = select(rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=seed)
     if arguments.split is None:
         parts = Split(train=rows["episode_index"].tolist(), evaluation=[])
     else:
-        parts = split(rows, arguments.split, eval_fraction=arguments.eval_fraction, seed=arguments.seed)
+        fraction = DEFAULT_EVAL_FRACTION if arguments.eval_fraction is None else arguments.eval_fraction
+        parts = split(rows, arguments.split, eval_fraction=fraction, seed=seed)
     if parts.evaluation:
         from lerobot_excav.datasets.episode_table import require_single_task
 

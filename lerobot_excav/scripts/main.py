@@ -20,8 +20,10 @@ EPILOG = """\
 a first round:
   lerobot-excav demos --scenes=50 --targets=4 --out=outputs/digging
   lerobot-excav qc outputs/digging
-  lerobot-train --policy.type=mask_act --policy.push_to_hub=false --dataset.repo_id=local/digging \\
-      --dataset.root=outputs/digging --output_dir=outputs/train \\
+  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.target_token=true \\
+      --policy.chunk_size=10 --policy.actions_per_token=1 --policy.push_to_hub=false \\
+      --dataset.repo_id=local/digging --dataset.root=outputs/digging --batch_size=16 --num_workers=1 \\
+      --output_dir=outputs/train --eval_steps=500 \\
       $(lerobot-excav index outputs/digging --split=scene --flags)
   lerobot-eval --policy.path=outputs/train/checkpoints/last/pretrained_model --env.type=excavator \\
       --env.scene_set=test --env.metrics_path=outputs/metrics.jsonl --eval.n_episodes=40
@@ -51,6 +53,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return int(command.run(command_parser(name, command).parse_args(rest)))
     except ExcavError as error:
         print(f"lerobot-excav {name}: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        # A folder in place of a file, no permission, a full disk: nothing a traceback would explain.
+        place = f"{error.filename}: " if error.filename is not None else ""
+        print(f"lerobot-excav {name}: {place}{error.strerror or error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"\nlerobot-excav {name}: interrupted", file=sys.stderr)

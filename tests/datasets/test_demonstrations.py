@@ -95,7 +95,7 @@ def test_failed_episodes_can_be_kept_and_are_marked(tmp_path, record_toy):
 def test_nothing_is_written_when_every_episode_fails(tmp_path, toy_rig, toy_settings, monkeypatch):
     rig, settings = toy_rig(), toy_settings(first_scene=3, scenes=1)
     monkeypatch.setattr(type(settings), "pairs", lambda self: [Pair("excavator", "train", 3, 1)])
-    with pytest.raises(DatasetError, match="none of 1 episodes succeeded"):
+    with pytest.raises(DatasetError, match=r"none of 1 .* remove \S*d\.partial and record again"):
         record_demonstrations(settings, tmp_path / "d", workers=0, rig=rig, show_progress=False)
     assert not (tmp_path / "d").exists()
 
@@ -127,6 +127,17 @@ def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(
         record_toy(tmp_path / "d")
     with pytest.raises(ConfigurationError, match="--soil=gravel differs"):
         record_toy(tmp_path / "d", soil="gravel", resume=True)
+
+
+def test_a_switch_that_differs_is_named_as_the_user_writes_it(toy_settings):
+    with pytest.raises(ConfigurationError, match="does not have --keep-failures; continue it without"):
+        toy_settings(keep_failures=True).require_same(toy_settings())
+
+
+def test_a_negative_number_of_workers_leaves_no_folder(tmp_path, toy_settings):
+    with pytest.raises(ConfigurationError, match="--workers=-1"):
+        record_demonstrations(toy_settings(), tmp_path / "d", workers=-1)
+    assert not list(tmp_path.iterdir())
 
 
 def test_two_runs_cannot_write_the_same_dataset(tmp_path, record_toy, toy_settings):

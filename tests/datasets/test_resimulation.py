@@ -168,6 +168,13 @@ def test_a_failure_while_writing_leaves_the_recording_alone(recording, toy_rig, 
     assert [path.name for path in tmp_path.iterdir()] == ["recording"]
 
 
+def test_a_failed_exchange_puts_the_recording_back(tmp_path):
+    (tmp_path / "recording").mkdir()
+    with pytest.raises(FileNotFoundError):
+        resimulation._put_in_place(tmp_path / "absent", tmp_path / "recording", None)
+    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+
+
 def test_a_dataset_with_the_columns_is_not_completed_again(paired_dataset, session, toy_rig, tmp_path):
     with pytest.raises(DatasetError, match="already"):
         complete_recording(paired_dataset, session(), out=tmp_path / "c", rig=toy_rig())

@@ -6,26 +6,23 @@ from lerobot.utils.feature_utils import combine_feature_dicts
 
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import (
-    ACTION_NAMES,
-    CAMERAS,
     ROBOT_TYPE,
-    STATE_NAMES,
     dataset_features,
     excav_features,
     require_columns,
 )
+from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.robots.excavator_sim import features as robot
 
 
 def recorder_features(*, use_videos: bool) -> dict:
     """Describe what `lerobot-record` writes from a robot with these features, by its own functions."""
     teleop_processor, _, observation_processor = make_default_processors()
-    observation = {**dict.fromkeys(robot.STATE_NAMES, float), **dict.fromkeys(robot.CAMERAS, (32, 48, 3))}
+    observation = {**dict.fromkeys(STATE_NAMES, float), **dict.fromkeys(CAMERAS, (32, 48, 3))}
     return combine_feature_dicts(
         aggregate_pipeline_dataset_features(
             pipeline=teleop_processor,
-            initial_features=create_initial_features(action=dict.fromkeys(robot.ACTION_NAMES, float)),
+            initial_features=create_initial_features(action=dict.fromkeys(ACTION_NAMES, float)),
             use_videos=use_videos,
         ),
         aggregate_pipeline_dataset_features(
@@ -36,10 +33,9 @@ def recorder_features(*, use_videos: bool) -> dict:
     )
 
 
-def test_names_are_those_of_the_simulated_robot():
+def test_the_robot_type_is_that_of_the_simulated_robot():
     from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 
-    assert (STATE_NAMES, ACTION_NAMES, CAMERAS) == (robot.STATE_NAMES, robot.ACTION_NAMES, robot.CAMERAS)
     assert ExcavatorSim.name == ROBOT_TYPE
 
 

@@ -63,6 +63,18 @@ def test_out_needs_a_session(paired_dataset, output, tmp_path):
     assert "--session only" in output(paired_dataset, f"--out={tmp_path / 'x'}")
 
 
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--eval-fraction=0.3", "--eval-fraction=0.3 has no effect without --split"),
+        ("--seed=0", "--seed=0 has no effect without a choice"),
+    ],
+)
+def test_options_without_effect_are_refused(paired_dataset, output, option, message):
+    assert message in output(paired_dataset, option)
+    assert message in output(paired_dataset, option, "--flags")
+
+
 def test_indexing_rewrites_the_index_only(paired_dataset, output):
     before = read_index(paired_dataset)
     output(paired_dataset)

@@ -75,3 +75,11 @@ def test_errors_of_this_package_are_what_is_caught(monkeypatch, capsys):
     monkeypatch.setattr(report, "run", fail)
     assert main(["report", "x"]) == 2
     assert capsys.readouterr().err == "lerobot-excav report: damaged\n"
+
+
+def test_an_error_of_the_system_names_the_file_in_one_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["qc", str(tmp_path / "file")]) == 2
+    assert (
+        capsys.readouterr().err == f"lerobot-excav qc: {tmp_path / 'file/meta/info.json'}: Not a directory\n"
+    )

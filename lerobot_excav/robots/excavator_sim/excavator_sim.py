@@ -20,17 +20,12 @@ from lerobot.robots import Robot
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
+from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
-from lerobot_excav.robots.excavator_sim.features import (
-    ACTION_NAMES,
-    CAMERAS,
-    NEXT_SCENE,
-    REINITIALISE,
-    STATE_NAMES,
-)
+from lerobot_excav.robots.excavator_sim.features import NEXT_SCENE, REINITIALISE
 from lerobot_excav.robots.excavator_sim.recording_phases import RecordingPhases
 from lerobot_excav.robots.excavator_sim.session_log import SessionLog, default_path
 

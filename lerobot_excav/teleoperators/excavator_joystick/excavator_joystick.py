@@ -5,8 +5,9 @@ from typing import Any, override
 
 from lerobot.teleoperators.teleoperator import Teleoperator
 
+from lerobot_excav.envs.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES, NEXT_SCENE, REINITIALISE
+from lerobot_excav.robots.excavator_sim.features import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
 from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping

@@ -10,9 +10,9 @@ import numpy as np
 from lerobot.teleoperators.teleoperator import Teleoperator
 
 from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
-from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 
+from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
-from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES, STATE_NAMES
 
 MakeRobot = Callable[..., ExcavatorSim]
 STILL = dict.fromkeys(ACTION_NAMES, 0.0)

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
-from lerobot_excav.robots.excavator_sim.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.robots.excavator_sim.session_log import SessionLog, default_path
 
 MakeRobot = Callable[..., ExcavatorSim]

@@ -1,0 +1,14 @@
+"""Names of what an excavator reports and obeys, in LeRobot's flat dictionaries and datasets.
+
+Each scalar ends in `.pos` or `.vel`: `lerobot-rollout` drops every other name without a word.
+"""
+
+JOINTS = ("swing", "boom", "arm", "bucket")
+
+ACTION_NAMES = tuple(f"{joint}.vel" for joint in JOINTS)
+"""Joystick commands in [-1, 1], in the order of the environment's action."""
+
+STATE_NAMES = (*(f"{joint}.pos" for joint in JOINTS), *ACTION_NAMES)
+"""Joint positions [rad] and velocities [rad/s], in the order of `agent_pos`."""
+
+CAMERAS = ("main", "cab", "target_mask")
