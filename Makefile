@@ -33,7 +33,7 @@ $(READY): pyproject.toml uv.lock
 	  echo "  Ubuntu 24.04: sudo apt-get install python3.12-venv; then run make again."; exit 1; }
 	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
 	@echo "Installing into $(VENV) (LeRobot, PyTorch and MuJoCo: several GB the first time) …"
-	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact
+	@UV_PROJECT_ENVIRONMENT=$(VENV) UV_COMPILE_BYTECODE=1 $(UV) sync --frozen --quiet --inexact
 	@touch $@
 
 demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)

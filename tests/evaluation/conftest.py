@@ -3,13 +3,10 @@
 import json
 
 import pytest
-from hypothesis import settings
 
 from lerobot_excav.evaluation.metrics import Run, read_evaluation
 
 # How long an example takes says how busy the machine is, not whether the code is right.
-settings.register_profile("unhurried", deadline=None)
-settings.load_profile("unhurried")
 
 
 def line(number, **changes):

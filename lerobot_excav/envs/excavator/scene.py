@@ -1,6 +1,7 @@
 """Scenes: everything that is drawn before the first action, from a scene set and a number."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +52,12 @@ def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.asarray(x_w), np.asarray(y_w)
 
 
+@lru_cache(maxsize=8)
 def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
     """Draw a scene; the same arguments give the same scene, byte for byte.
+
+    Drawing takes most of a reset, and the targets of a scene are played one after the other: the last scenes are kept.
+    Their arrays are read-only.
 
     Args:
         scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
@@ -72,12 +77,15 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
     pile_rng, pose_rng, look_rng = (np.random.default_rng(s) for s in stream.spawn(3))
     heights_m, targets = _draw_pile_with_targets(pile_rng, soil)
+    joint_pos = _draw_joint_pos(pose_rng)
+    for array in (heights_m, joint_pos, *(target.center_w for target in targets)):
+        array.flags.writeable = False
     return Scene(
         scene_set=scene_set,
         scene_id=scene_id,
         soil=soil,
         heights_m=heights_m,
-        joint_pos=_draw_joint_pos(pose_rng),
+        joint_pos=joint_pos,
         appearance=draw_appearance(look_rng),
         targets=targets,
     )

@@ -18,11 +18,21 @@ def scene(request):
 
 
 def test_same_number_gives_the_same_scene_byte_for_byte():
-    a, b = draw_scene("val", 11), draw_scene("val", 11)
+    a = draw_scene("val", 11)
+    draw_scene.cache_clear()
+    b = draw_scene("val", 11)
+    assert a is not b
     assert a.heights_m.tobytes() == b.heights_m.tobytes()
     assert a.joint_pos.tobytes() == b.joint_pos.tobytes()
     assert a.appearance == b.appearance
     assert all(np.array_equal(s.center_w, t.center_w) for s, t in zip(a.targets, b.targets, strict=True))
+
+
+def test_a_kept_scene_cannot_be_changed():
+    scene = draw_scene("val", 11)
+    for array in (scene.heights_m, scene.joint_pos, scene.targets[0].center_w):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
 
 
 def test_scene_sets_share_no_scene():
