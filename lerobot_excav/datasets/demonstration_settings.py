@@ -5,6 +5,7 @@ from typing import Any
 
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.envs.settings import (
+    FIDELITIES,
     SCENE_SETS,
     SOILS,
     TARGETS_PER_SCENE,
@@ -34,6 +35,7 @@ class DemonstrationSettings:
         height: Image height [px].
         width: Image width [px].
         soil: Name of the soil preset.
+        fidelity: Numerical effort of the soil.
         episode_length: Time limit [frames].
         keep_failures: Whether episodes without success stay in the dataset.
     """
@@ -49,6 +51,7 @@ class DemonstrationSettings:
     height: int = 96
     width: int = 128
     soil: str = "sand"
+    fidelity: str = "standard"
     episode_length: int = 200
     keep_failures: bool = False
 
@@ -57,6 +60,7 @@ class DemonstrationSettings:
         require_task("--task", self.task)
         require_choice("--scene-set", self.scene_set, SCENE_SETS)
         require_choice("--soil", self.soil, SOILS)
+        require_choice("--fidelity", self.fidelity, FIDELITIES)
         require_fps("--fps", self.fps)
         require_image_size("--height", self.height)
         require_image_size("--width", self.width)

@@ -11,7 +11,7 @@ from lerobot_excav.datasets.episode_check import MAIN_KEY, episode_problems, sce
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, build_index, store_index
-from lerobot_excav.datasets.replay_check import replay_problem, soil_of
+from lerobot_excav.datasets.replay_check import SoilChoice, replay_problem, soil_of
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import require_columns
 from lerobot_excav.errors import require
@@ -24,6 +24,7 @@ def check_dataset(
     replays: int = 3,
     seed: int = 0,
     soil: str | None = None,
+    fidelity: str | None = None,
     rig: Rig | None = None,
 ) -> pd.DataFrame:
     """Check a dataset and note the verdicts in its index.
@@ -34,6 +35,7 @@ def check_dataset(
         replays: How many of them to replay, chosen at random.
         seed: Seed of that choice.
         soil: Soil of the replays; by default what the dataset says.
+        fidelity: Its numerical effort; by default what the dataset says.
         rig: Makes the environment of the replays; the excavator by default.
 
     Returns:
@@ -58,9 +60,10 @@ def check_dataset(
     sound = [number for number in wanted if not problems[number]]
     sample = np.random.default_rng(seed).permutation(sound)[:replays].tolist()
     if sample:
-        rig, soil = rig or ExcavatorRig(with_images=False), soil or soil_of(root)
+        rig = rig or ExcavatorRig(with_images=False)
+        choice = SoilChoice(soil, fidelity) if soil and fidelity else _chosen(soil_of(root), soil, fidelity)
         for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
-            problem = replay_problem(rig, recorded, fps=info.fps, soil=soil)
+            problem = replay_problem(rig, recorded, fps=info.fps, soil=choice)
             problems[recorded.index] = [problem] if problem else []
 
     checked = index["episode_index"].isin(wanted)
@@ -69,6 +72,10 @@ def check_dataset(
     index.loc[checked, "qc_problem"] = texts[checked]
     store_index(root, index)
     return index[checked].assign(replayed=index["episode_index"].isin(sample))
+
+
+def _chosen(recorded: SoilChoice, soil: str | None, fidelity: str | None) -> SoilChoice:
+    return SoilChoice(soil or recorded.soil, fidelity or recorded.fidelity)
 
 
 def _static_problems(root: Path, wanted: list[int]) -> dict[int, list[str]]:

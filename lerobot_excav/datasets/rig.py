@@ -45,6 +45,7 @@ class ExcavatorRig:
             fps=settings.fps,
             episode_length=settings.episode_length,
             soil=settings.soil,
+            fidelity=settings.fidelity,
             render_mode="rgb_array" if self.with_images else None,
         )
 

@@ -29,6 +29,7 @@ class SessionEpisode:
         target_id: Target.
         fps: Frames per second.
         soil: Name of the soil preset.
+        fidelity: Numerical effort of the soil.
         observation_height: Image height [px].
         observation_width: Image width [px].
         task: Task of the environment.
@@ -42,6 +43,7 @@ class SessionEpisode:
     target_id: int
     fps: int
     soil: str
+    fidelity: str
     observation_height: int
     observation_width: int
     task: str
@@ -62,6 +64,7 @@ class SessionEpisode:
             height=self.observation_height,
             width=self.observation_width,
             soil=self.soil,
+            fidelity=self.fidelity,
             episode_length=_ENDLESS_FRAMES,
         )
 

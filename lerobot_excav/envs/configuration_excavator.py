@@ -40,6 +40,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
         scene_set: Stream of scenes: `train`, `val` or `test`. Evaluations meant for a report use `test`.
         mask_condition: What the target mask shows: `correct`, `zero`, `random` or `mismatched`.
         soil: Soil preset.
+        fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
         metrics_path: JSON Lines file to which every finished episode is appended; see `envs.metrics_log`.
         metrics_episodes: Number of episodes to write; give it `--eval.n_episodes` when the batch size does
             not divide that, and LeRobot's surplus episodes stay out of the file. None writes all.
@@ -54,6 +55,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
     scene_set: str = "train"
     mask_condition: str = "correct"
     soil: str = "sand"
+    fidelity: str = "standard"
     metrics_path: Path | None = None
     metrics_episodes: int | None = None
     render_mode: str | None = "rgb_array"
@@ -102,6 +104,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
             "scene_set": self.scene_set,
             "mask_condition": self.mask_condition,
             "soil": self.soil,
+            "fidelity": self.fidelity,
             "render_mode": self.render_mode,
         }
 
@@ -129,6 +132,7 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
                 "scene_set": self.scene_set,
                 "mask_condition": self.mask_condition,
                 "soil": self.soil,
+                "fidelity": self.fidelity,
                 "fps": self.fps,
             }
         vector = make_vector_env(self._make_one, n_envs, use_async=use_async_envs, metrics_log=log)

@@ -4,7 +4,7 @@ LeRobot keeps rewards and success only. This file keeps the rest, written by the
 in which LeRobot counts: line `i` of an evaluation is `per_episode[i]` of its `eval_info.json`.
 
     {"episode_ix": 0, "seed": 1000, "task": "Scoop-v0", "scene_set": "test", "mask_condition": "correct",
-     "soil": "sand", "fps": 10, "scene_id": 1000, "target_id": 0, "success": true, ...}
+     "soil": "sand", "fidelity": "standard", "fps": 10, "scene_id": 1000, "target_id": 0, "success": true, ...}
 
 followed by every entry of the environment's `episode_metrics`. A number that does not exist, such as the
 distance at a loading that never began, is `null`.

@@ -1,7 +1,7 @@
 """What the settings of `--env.type=excavator` and `--robot.type=excavator_sim` allow.
 
 Importing this loads no simulator, so that every command of LeRobot can parse its line quickly. For the same reason the
-names of the soil presets are repeated here; a test keeps them equal.
+names of the soil presets and fidelities are repeated here; a test keeps them equal.
 """
 
 from collections.abc import Sequence
@@ -14,13 +14,19 @@ from lerobot_excav.errors import require, require_choice
 SCENE_SETS = ("train", "val", "test")
 MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
 SOILS = ("sand", "gravel", "dirt", "wet_sand")
+FIDELITIES = ("fast", "standard", "fine")
 TARGETS_PER_SCENE = 4
 TICKS_PER_SECOND = 50
 EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
 RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
 
-_CHOICES = {"scene_set": SCENE_SETS, "mask_condition": MASK_CONDITIONS, "soil": SOILS}
+_CHOICES = {
+    "scene_set": SCENE_SETS,
+    "mask_condition": MASK_CONDITIONS,
+    "soil": SOILS,
+    "fidelity": FIDELITIES,
+}
 
 
 def require_task(field: str, task: str | None) -> None:
@@ -89,7 +95,8 @@ def require_worksite_settings(config: Any, *, prefix: str, fields: Sequence[str]
     """Validate the fields that describe the simulated worksite.
 
     Args:
-        config: Has `fps`, `observation_height`, `observation_width`, `scene_set`, `soil` and `fields`.
+        config: Has `fps`, `observation_height`, `observation_width`, `scene_set`, `soil`, `fidelity` and
+            `fields`.
         prefix: What the user writes before the name of a field, such as `env.`.
         fields: Further fields out of `mask_condition`.
 
@@ -99,5 +106,5 @@ def require_worksite_settings(config: Any, *, prefix: str, fields: Sequence[str]
     require_fps(f"{prefix}fps", config.fps)
     for name in ("observation_height", "observation_width"):
         require_image_size(f"{prefix}{name}", getattr(config, name))
-    for name in ("scene_set", "soil", *fields):
+    for name in ("scene_set", "soil", "fidelity", *fields):
         require_choice(f"{prefix}{name}", getattr(config, name), _CHOICES[name])

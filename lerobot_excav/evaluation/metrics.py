@@ -32,6 +32,7 @@ class EpisodeMetrics:
         target_id: Target.
         mask_condition: Which mask was shown.
         soil: Soil preset.
+        fidelity: Numerical effort of the soil.
         target_success: Whether loading began inside the commanded patch.
         is_success: Whether every part of the task succeeded.
         retained_mass_kg: Soil brought into the box [kg].
@@ -45,6 +46,7 @@ class EpisodeMetrics:
     target_id: int
     mask_condition: str
     soil: str
+    fidelity: str
     target_success: bool
     is_success: bool
     retained_mass_kg: float
@@ -177,10 +179,11 @@ class Run:
                 f"{self.label}: {evaluation.path} shows other scenes or targets than {self.evaluations[0].path}; "
                 "evaluate every seed with the same --seed and --eval.n_episodes",
             )
-        conditions = {(e.mask_condition, e.soil) for e in self.episodes}
+        conditions = {(e.mask_condition, e.soil, e.fidelity) for e in self.episodes}
         require(
             len(conditions) == 1,
-            f"{self.label} mixes mask conditions or soils: {sorted(conditions)}; give each a file of its own",
+            f"{self.label} mixes mask conditions, soils or fidelities: {sorted(conditions)}; "
+            "give each a file of its own",
         )
 
     @property

@@ -102,6 +102,7 @@ def _common(settings: DemonstrationSettings) -> dict[str, Any]:
         "task": settings.task,
         "scene_set": settings.scene_set,
         "soil": settings.soil,
+        "fidelity": settings.fidelity,
         "fps": settings.fps,
         "episode_length": settings.episode_length,
     }

@@ -23,6 +23,7 @@ class RunSummary:
         scenes: Number of scenes and targets.
         mask_condition: Which mask was shown.
         soil: Soil preset.
+        fidelity: Numerical effort of the soil.
         target_success: Rate, Wilson interval over episodes.
         full_success: Rate, Wilson interval over episodes.
         retained_mass_kg: Mean [kg], bootstrap interval over scenes and targets.
@@ -38,6 +39,7 @@ class RunSummary:
     scenes: int
     mask_condition: str
     soil: str
+    fidelity: str
     target_success: Interval
     full_success: Interval
     retained_mass_kg: Interval
@@ -106,6 +108,7 @@ def _summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunS
         scenes=len(run.keys),
         mask_condition=episodes[0].mask_condition,
         soil=episodes[0].soil,
+        fidelity=episodes[0].fidelity,
         target_success=rate([episode.target_success for episode in episodes]),
         full_success=rate([episode.is_success for episode in episodes]),
         retained_mass_kg=bootstrap_mean(retained, rng),

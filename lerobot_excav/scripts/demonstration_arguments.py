@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import ENVS, DemonstrationSettings
-from lerobot_excav.envs.settings import SCENE_SETS, SOILS, TARGETS_PER_SCENE
+from lerobot_excav.envs.settings import FIDELITIES, SCENE_SETS, SOILS, TARGETS_PER_SCENE
 
 DEFAULT_WORKERS = 2
 
@@ -37,6 +37,7 @@ def add_settings(parser: argparse.ArgumentParser, **defaults: Any) -> None:
     add("seed", "seed of the operator's variations", type=int)
     add("fps", "frames per second", type=int)
     add("soil", "soil preset", choices=SOILS)
+    add("fidelity", "numerical effort of the soil", choices=FIDELITIES)
     add("episode-length", "time limit [frames]", type=int)
     group.add_argument(
         "--workers",

@@ -8,7 +8,7 @@ Examples:
       check every episode, replay 3 of them
   lerobot-excav qc outputs/paired --replays=20 --seed=1
       replay 20, other ones
-  lerobot-excav qc outputs/merged --episodes=0,5,7 --replays=3 --soil=sand
+  lerobot-excav qc outputs/merged --episodes=0,5,7 --replays=3 --soil=sand --fidelity=standard
       check three episodes; merging lost the record of the soil
 """
 
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.envs.settings import SOILS
+from lerobot_excav.envs.settings import FIDELITIES, SOILS
 
 DEFAULT_REPLAYS = 3
 
@@ -34,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the choice of replays (default: 0)")
     parser.add_argument("--soil", choices=SOILS, help="soil of the replays (default: what the dataset says)")
+    parser.add_argument(
+        "--fidelity", choices=FIDELITIES, help="its numerical effort (default: what the dataset says)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -47,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
         replays=arguments.replays,
         seed=arguments.seed,
         soil=arguments.soil,
+        fidelity=arguments.fidelity,
     )
     failed = rows[rows["qc"] == FAILED]
     for line in failure_table(failed):

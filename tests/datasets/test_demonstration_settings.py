@@ -41,6 +41,7 @@ def test_settings_of_another_version_are_refused():
         {"task": "Dig-v9"},
         {"scene_set": "all"},
         {"soil": "mud"},
+        {"fidelity": "exact"},
         {"fps": 12},
         {"height": 8},
         {"width": 5000},

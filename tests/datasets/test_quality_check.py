@@ -153,6 +153,9 @@ def test_a_wrong_outcome_is_found(tampered, toy_rig):
 def test_replays_need_to_know_the_soil(paired_dataset, toy_rig, tmp_path):
     shutil.copytree(paired_dataset, tmp_path / "d")
     (tmp_path / "d" / PROVENANCE_PATH).unlink()
-    with pytest.raises(DatasetError, match="give --soil"):
+    with pytest.raises(DatasetError, match="give --soil and --fidelity"):
         check_dataset(tmp_path / "d", replays=1, rig=toy_rig())
-    assert set(check_dataset(tmp_path / "d", replays=1, soil="sand", rig=toy_rig())["qc"]) == {"passed"}
+    given = {"soil": "sand", "fidelity": "standard"}
+    with pytest.raises(DatasetError, match="give --soil and --fidelity"):
+        check_dataset(tmp_path / "d", replays=1, soil="sand", rig=toy_rig())
+    assert set(check_dataset(tmp_path / "d", replays=1, rig=toy_rig(), **given)["qc"]) == {"passed"}

@@ -30,6 +30,7 @@ def recording(paired_dataset, tmp_path_factory):
             "target_id": int(row.target_id),
             "fps": 10,
             "soil": "sand",
+            "fidelity": "standard",
             "observation_height": 32,
             "observation_width": 48,
             "task": "Scoop-v0",
@@ -181,7 +182,9 @@ def test_a_dataset_with_the_columns_is_not_completed_again(paired_dataset, sessi
     assert (paired_dataset / INDEX_PATH).is_file()
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks fps")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks fidelity, fps")]
+)
 def test_a_damaged_session_names_the_line(recording, toy_rig, tmp_path, text, message):
     folder, _ = recording
     (tmp_path / "s.jsonl").write_text(text)

@@ -49,6 +49,7 @@ def test_feature_names_can_be_recorded() -> None:
         ("scene_set", "exam", "'train', 'val', 'test'"),
         ("mask_condition", "none", "'correct', 'zero', 'random', 'mismatched'"),
         ("soil", "lava", "'sand', 'gravel', 'dirt', 'wet_sand'"),
+        ("fidelity", "perfect", "'fast', 'standard', 'fine'"),
         ("fps", True, "10, 25"),
         ("fps", 10.0, "10, 25"),
         ("observation_height", 96.0, "32 to 1024"),
@@ -88,6 +89,7 @@ def test_every_setting_reaches_the_environment() -> None:
         "scene_set": "test",
         "mask_condition": "zero",
         "soil": "gravel",
+        "fidelity": "fine",
     }
     config = ExcavatorEnvConfig(**settings)
     assert config.gym_kwargs == {**settings, "render_mode": "rgb_array"}

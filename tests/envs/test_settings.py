@@ -5,12 +5,13 @@ import pytest
 from lerobot_excav.envs import settings
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.excavator.worksite import TICK_S
-from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS
 from lerobot_excav.errors import ConfigurationError
 
 
 def test_repeated_values_are_those_of_the_simulation() -> None:
     assert set(settings.SOILS) == set(PRESETS)
+    assert set(settings.FIDELITIES) == set(FIDELITIES)
     assert round(1.0 / TICK_S) == settings.TICKS_PER_SECOND
 
 

@@ -19,6 +19,7 @@ def line(number, **changes):
         "target_id": number % 4,
         "mask_condition": "correct",
         "soil": "sand",
+        "fidelity": "standard",
         "target_success": True,
         "is_success": True,
         "retained_mass_kg": 300.0,

@@ -27,6 +27,7 @@ class StillEnv:
             **self.options,
             "mask_condition": "correct",
             "soil": "sand",
+            "fidelity": "standard",
             "target_success": True,
             "is_success": True,
             "retained_mass_kg": float(self.options["scene_id"]),

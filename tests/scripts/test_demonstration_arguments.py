@@ -35,6 +35,7 @@ def test_the_operator_digs_in_test_scenes_by_default():
         ("height", 64),
         ("width", 64),
         ("soil", "gravel"),
+        ("fidelity", "fine"),
         ("episode_length", 50),
     ],
 )

@@ -14,7 +14,8 @@ def metrics(tmp_path):
     def write(name, *masses):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
-        common = {"scene_set": "test", "target_id": 0, "mask_condition": "correct", "soil": "sand"}
+        common = {"scene_set": "test", "target_id": 0, "mask_condition": "correct"}
+        common |= {"soil": "sand", "fidelity": "standard"}
         outcome = {"target_success": True, "is_success": True, "residual_bucket_mass_kg": 0.0}
         events = {"hard_target_contacts": 0, "spill_before_target_events": 0}
         lines = [

@@ -15,6 +15,7 @@ from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
 from lerobot_excav.envs.settings import (
     EPISODE_DURATION_S,
+    FIDELITIES,
     MASK_CONDITIONS,
     RENDER_MODES,
     SCENE_SETS,
@@ -76,6 +77,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         fps: Frames per second; divides 50.
         episode_length: Time limit in frames; None: those of 20 s.
         soil: Name of the soil preset.
+        fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
         render_mode: `rgb_array` or None.
         depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
     """
@@ -94,6 +96,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         fps: int = 10,
         episode_length: int | None = None,
         soil: str = "sand",
+        fidelity: str = "standard",
         render_mode: str | None = "rgb_array",
         depth_info: bool = False,
     ) -> None:
@@ -102,13 +105,15 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
         require_choice("soil", soil, SOILS)
+        require_choice("fidelity", fidelity, FIDELITIES)
         require_choice("render_mode", render_mode, RENDER_MODES)
         require_fps("fps", fps)
         require_image_size("observation_height", observation_height)
         require_image_size("observation_width", observation_width)
         require_episode_length("episode_length", episode_length)
         self.task, self.task_description = task, TASK_DESCRIPTION
-        self.scene_set, self.mask_condition, self.soil_name = scene_set, mask_condition, soil
+        self.scene_set, self.mask_condition = scene_set, mask_condition
+        self.soil_name, self.fidelity = soil, fidelity
         self.fps = fps
         self.episode_length = round(EPISODE_DURATION_S * fps) if episode_length is None else episode_length
         self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
@@ -127,7 +132,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     def worksite(self) -> Worksite:
         """Machine, soil and box; built at first use, so that vector workers build their own."""
         if self._worksite is None:
-            self._worksite = Worksite(soil=self.soil_name)
+            self._worksite = Worksite(soil=self.soil_name, fidelity=self.fidelity)
         return self._worksite
 
     @property
@@ -275,6 +280,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "target_id": self.target_id,
             "mask_condition": self.mask_condition,
             "soil": self.soil_name,
+            "fidelity": self.fidelity,
             "is_success": self.cycle.is_success,
             "frames": self._frame,
             **self.cycle.metrics(),

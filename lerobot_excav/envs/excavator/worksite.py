@@ -15,12 +15,17 @@ class Worksite:
 
     Args:
         soil: Name of the soil preset.
+        fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
     """
 
-    def __init__(self, *, soil: str = "sand") -> None:
+    def __init__(self, *, soil: str = "sand", fidelity: str = "standard") -> None:
         self.machine = ExcavatorMachine(container=TARGET_BOX, terrain_shape_m=DIG_AREA_EXTENT_M)
         self.soil = Soil(
-            preset=soil, extent_m=DIG_AREA_EXTENT_M, cell_size_m=SOIL_CELL_SIZE_M, container=TARGET_BOX
+            preset=soil,
+            extent_m=DIG_AREA_EXTENT_M,
+            cell_size_m=SOIL_CELL_SIZE_M,
+            fidelity=fidelity,
+            container=TARGET_BOX,
         )
         self.time_s = 0.0
         self._ticks = 0

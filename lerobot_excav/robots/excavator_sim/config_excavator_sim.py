@@ -26,6 +26,7 @@ class ExcavatorSimConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classe
         scene_id: First scene.
         target_id: First target in it, 0 to 3.
         soil: Soil preset.
+        fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
         advance: What leads to the next target: `episode`, so that every recorded episode has its own, or
             `button`, so that only the side-channel key `next_scene` does.
         session_log: JSON Lines file about the recorded episodes (see `session_log.py`), by default
@@ -41,6 +42,7 @@ class ExcavatorSimConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classe
     scene_id: int = 0
     target_id: int = 0
     soil: str = "sand"
+    fidelity: str = "standard"
     advance: str = "episode"
     session_log: Path | None = None
     depth: bool = False

@@ -133,6 +133,7 @@ class ExcavatorSim(Robot):  # type: ignore[misc]  # LeRobot's classes are untype
             fps=self.config.fps,
             episode_length=_ENDLESS,
             soil=self.config.soil,
+            fidelity=self.config.fidelity,
         )
         self._number, self._skipped = self._first, 0
         self._reset()
@@ -232,6 +233,7 @@ class ExcavatorSim(Robot):  # type: ignore[misc]  # LeRobot's classes are untype
             "scene_set": self.config.scene_set,
             "fps": self.config.fps,
             "soil": self.config.soil,
+            "fidelity": self.config.fidelity,
             "observation_height": self.config.observation_height,
             "observation_width": self.config.observation_width,
             "task": self.config.task,

@@ -4,6 +4,7 @@ import pytest
 from lerobot_excav.envs.excavator.env import FULL_BUCKET_KG, ExcavatorEnv
 from lerobot_excav.envs.excavator.operator import ScriptedOperator
 from lerobot_excav.envs.excavator.targets import target_mask_img
+from lerobot_excav.envs.soil import FIDELITIES
 from lerobot_excav.errors import ConfigurationError
 
 
@@ -127,6 +128,7 @@ def test_an_episode_lasts_20_s_unless_told(fps, frames):
         ({"scene_set": "eval"}, "'train', 'val', 'test'"),
         ({"mask_condition": "wrong"}, "'mismatched'"),
         ({"soil": "mud"}, "'wet_sand'"),
+        ({"fidelity": "exact"}, "'fine'"),
         ({"obs_type": "state"}, "'agent_pos'"),
         ({"render_mode": "human"}, "'rgb_array'"),
         ({"episode_length": 0}, "episode_length=0"),
@@ -150,6 +152,27 @@ def test_scene_set_changes_the_scene(env):
         other.reset(seed=7)
         heights[scene_set] = other.scene.heights_m.tobytes()
     assert len(set(heights.values())) == 3
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "standard", "fine"])
+def test_fidelity_reaches_soil_and_metrics(fidelity):
+    env = ExcavatorEnv(fidelity=fidelity, episode_length=1, obs_type="agent_pos")
+    env.reset(seed=0)
+    assert env.worksite.soil.fidelity == FIDELITIES[fidelity]
+    assert env.step(np.zeros(4))[4]["episode_metrics"]["fidelity"] == fidelity
+
+
+def test_fidelity_changes_the_course_of_the_soil():
+    taken_kg = set()
+    for fidelity in FIDELITIES:
+        env = ExcavatorEnv(fidelity=fidelity, obs_type="agent_pos")
+        env.reset(seed=2)
+        operator = ScriptedOperator(rng=np.random.default_rng(0))
+        operator.reset(env)
+        while env.worksite.soil.payload_mass_kg < 20.0:
+            env.step(operator.act(env))
+        taken_kg.add(env.worksite.soil.payload_mass_kg)
+    assert len(taken_kg) == len(FIDELITIES)
 
 
 def test_mask_shows_the_commanded_patch_of_the_soil(seeing_env):

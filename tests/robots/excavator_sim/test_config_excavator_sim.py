@@ -16,6 +16,7 @@ from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSim
         ("scene_id", -1, "from 0"),
         ("target_id", 4, "0, 1, 2, 3"),
         ("soil", "lava", "'sand'"),
+        ("fidelity", "exact", "'fine'"),
         ("advance", "never", "'episode', 'button'"),
     ],
 )

@@ -58,9 +58,10 @@ def test_an_observation_can_be_changed_without_harm(make_robot: MakeRobot) -> No
 
 
 def test_settings_reach_the_environment(make_robot: MakeRobot) -> None:
-    robot = make_robot(fps=25, soil="gravel", scene_set="val", observation_height=64)
+    robot = make_robot(fps=25, soil="gravel", fidelity="fine", scene_set="val", observation_height=64)
     settings = robot.env.settings  # type: ignore[attr-defined]
     assert (settings["fps"], settings["soil"], settings["scene_set"]) == (25, "gravel", "val")
+    assert settings["fidelity"] == "fine"
     assert settings["observation_height"] == 64
 
 

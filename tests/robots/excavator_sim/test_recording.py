@@ -77,7 +77,9 @@ def test_a_press_leaves_one_target_out(make_robot: MakeRobot) -> None:
 
 
 def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
-    robot = make_robot(scene_set="val", scene_id=3, fps=25, soil="gravel", observation_width=160)
+    robot = make_robot(
+        scene_set="val", scene_id=3, fps=25, soil="gravel", fidelity="fast", observation_width=160
+    )
     record_episode(robot, 0, frames=4)
     assert lines_of(robot) == []
     robot.disconnect()
@@ -89,6 +91,7 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
             "target_id": 0,
             "fps": 25,
             "soil": "gravel",
+            "fidelity": "fast",
             "observation_height": 96,
             "observation_width": 160,
             "task": "Scoop-v0",
