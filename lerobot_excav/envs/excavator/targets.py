@@ -5,28 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.cameras import MAIN
-from lerobot_excav.envs.excavator.constants import BUCKET_INNER_WIDTH_M
-from lerobot_excav.envs.excavator.layout import cylinder_from_world, world_from_cylinder
-from lerobot_excav.envs.excavator.visibility import seen_area_px
+from lerobot_excav.envs.excavator.feasibility import PATCH_SIZE_M, feasible_centers_w
+from lerobot_excav.envs.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import ExcavError
 
-PATCH_SIZE_M = 0.8
-"""Edge of the square patch on the ground plane [m] (design: about 0.8 m x 0.8 m)."""
-
-# Feasibility of a dig region (kind: tuned on train scenes, with the scripted operator).
-RADIUS_RANGE_M = (3.5, 5.9)
-LEAST_MEAN_HEIGHT_M = 0.38
 LEAST_DISTANCE_M = 1.0
-DIG_LENGTH_M = 1.4
-CUT_DEPTH_M = 0.55
-LEAST_DIGGABLE_M3 = 0.40
+"""Between the centres of two targets of a scene, on the ground plane [m] (kind: tuned)."""
 
-LEAST_MASK_PX = 60.0
-"""Least area of a mask in the main view of 96 x 128 pixels, the machine left out (kind: tuned)."""
-
-_PICTURE_HEIGHT_PX = 96
+_ORDERS = 100
 
 
 class TooFewTargetsError(ExcavError):
@@ -86,19 +73,18 @@ def find_targets(
     Raises:
         TooFewTargetsError: The pile offers fewer than `count` such regions.
     """
-    candidates = _feasible_targets(heights_m, x_w, y_w)
+    centers_w = feasible_centers_w(heights_m, x_w, y_w)
+    apart = np.linalg.norm(centers_w[:, None, :2] - centers_w[None, :, :2], axis=-1) >= LEAST_DISTANCE_M
     # Greedy picks can block each other: several random orders, then give up.
-    for _ in range(20):
-        picked: list[Target] = []
-        for index in rng.permutation(len(candidates)):
-            candidate = candidates[index]
-            if all(_ground_distance(candidate, other) >= LEAST_DISTANCE_M for other in picked):
-                picked.append(candidate)
-            if len(picked) == count:
-                return tuple(picked)
-    raise TooFewTargetsError(
-        f"the pile has room for {len(picked)} dig regions, {count} are wanted; draw another pile"
-    )
+    for _ in range(_ORDERS):
+        free = np.ones(len(centers_w), dtype=bool)
+        picked: list[int] = []
+        while len(picked) < count and free.any():
+            picked.append(int(rng.choice(np.flatnonzero(free))))
+            free &= apart[picked[-1]]
+        if len(picked) == count:
+            return tuple(_target(centers_w[i]) for i in picked)
+    raise TooFewTargetsError(f"the pile has no room for {count} dig regions; draw another pile")
 
 
 def target_mask_img(target: Target, terrain_points_w: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -115,68 +101,5 @@ def target_mask_img(target: Target, terrain_points_w: NDArray[np.float64]) -> ND
     return np.repeat(np.where(inside, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def _ground_distance(a: Target, b: Target) -> float:
-    return float(np.hypot(*(a.center_w[:2] - b.center_w[:2])))
-
-
-def _feasible_targets(
-    heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
-) -> list[Target]:
-    """Every feasible region on a 10 cm raster of the dig area."""
-    step = max(1, round(0.1 / float(x_w[1] - x_w[0])))
-    seen_px = seen_area_px(heights_m, x_w, y_w, MAIN, picture_height_px=_PICTURE_HEIGHT_PX)
-    feasible = []
-    for ix in range(0, x_w.size, step):
-        for iy in range(0, y_w.size, step):
-            if heights_m[ix, iy] < LEAST_MEAN_HEIGHT_M:
-                continue
-            center_w = np.array([x_w[ix], y_w[iy], heights_m[ix, iy]])
-            radius, swing, _ = cylinder_from_world(center_w)
-            target = Target(center_w=center_w, yaw_rad=swing)
-            if (
-                RADIUS_RANGE_M[0] <= radius <= RADIUS_RANGE_M[1]
-                and _has_enough_soil(target, heights_m, x_w, y_w)
-                and _sum_over_patch(target, seen_px, x_w, y_w) >= LEAST_MASK_PX
-            ):
-                feasible.append(target)
-    return feasible
-
-
-def _sum_over_patch(
-    target: Target, values: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
-) -> float:
-    """Sum what belongs to the cells of a patch, shape of `values`: (nx, ny)."""
-    reach_m = 0.5 * np.sqrt(2.0) * target.size_m
-    near_x, near_y = (
-        slice(*np.searchsorted(axis_w, (centre - reach_m, centre + reach_m)))
-        for axis_w, centre in ((x_w, target.center_w[0]), (y_w, target.center_w[1]))
-    )
-    points_w = np.stack(np.meshgrid(x_w[near_x], y_w[near_y], indexing="ij"), axis=-1)
-    return float(values[near_x, near_y][target.contains(points_w)].sum())
-
-
-def _has_enough_soil(
-    target: Target, heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64]
-) -> bool:
-    patch = _sample(heights_m, x_w, y_w, target, (-PATCH_SIZE_M / 2, PATCH_SIZE_M / 2))
-    dig_path = _sample(heights_m, x_w, y_w, target, (-DIG_LENGTH_M, 0.1))
-    diggable_m3 = np.minimum(dig_path, CUT_DEPTH_M).mean() * BUCKET_INNER_WIDTH_M * (DIG_LENGTH_M + 0.1)
-    return bool(patch.mean() >= LEAST_MEAN_HEIGHT_M and diggable_m3 >= LEAST_DIGGABLE_M3)
-
-
-def _sample(
-    heights_m: NDArray[np.float64],
-    x_w: NDArray[np.float64],
-    y_w: NDArray[np.float64],
-    target: Target,
-    along_range_m: tuple[float, float],
-) -> NDArray[np.float64]:
-    """Heights at the nearest cells of a strip of bucket width along the dig direction [m], shape (12, 5)."""
-    radius, swing, _ = cylinder_from_world(target.center_w)
-    along = radius + np.linspace(*along_range_m, 12)
-    across = np.linspace(-BUCKET_INNER_WIDTH_M / 2, BUCKET_INNER_WIDTH_M / 2, 5)
-    points = world_from_cylinder(along[:, None], swing + across[None, :] / radius)
-    cell = float(x_w[1] - x_w[0])
-    ix = np.clip(np.rint((points[..., 0] - x_w[0]) / cell).astype(int), 0, x_w.size - 1)
-    iy = np.clip(np.rint((points[..., 1] - y_w[0]) / cell).astype(int), 0, y_w.size - 1)
-    return np.asarray(heights_m[ix, iy])
+def _target(center_w: NDArray[np.float64]) -> Target:
+    return Target(center_w=center_w.copy(), yaw_rad=cylinder_from_world(center_w)[1])

@@ -1,10 +1,13 @@
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.excavator.feasibility import LEAST_MASK_PX, RADIUS_RANGE_M
 from lerobot_excav.envs.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.excavator.pile import PILE_MASS_RANGE_KG
+from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import SOIL_CELL_SIZE_M, cell_centres_w, draw_scene
-from lerobot_excav.envs.excavator.targets import LEAST_DISTANCE_M, RADIUS_RANGE_M
+from lerobot_excav.envs.excavator.targets import LEAST_DISTANCE_M, target_mask_img
+from lerobot_excav.envs.excavator.worksite import Worksite
 from lerobot_excav.envs.settings import SCENE_SETS, SOILS, TARGETS_PER_SCENE
 from lerobot_excav.envs.soil import PRESETS
 from lerobot_excav.errors import ConfigurationError
@@ -68,6 +71,20 @@ def test_targets_lie_on_the_soil_surface(scene):
     for target in scene.targets:
         ix, iy = np.argmin(np.abs(x_w - target.center_w[0])), np.argmin(np.abs(y_w - target.center_w[1]))
         assert target.center_w[2] == scene.heights_m[ix, iy] > 0.0
+
+
+@pytest.mark.parametrize("soil", ["sand", "gravel"])
+def test_every_target_has_a_mask_of_a_fair_number_of_pixels(soil):
+    worksite = Worksite(soil=soil)
+    renderer = WorksiteRenderer(worksite.machine, height=96, width=128)
+    for scene_set, scene_id in SCENES:
+        scene = draw_scene(scene_set, scene_id, soil=soil)
+        worksite.reset(scene)
+        points_w = renderer.terrain_points_w(worksite.soil)
+        for target in scene.targets:
+            # The picture has whole pixels and a coarser surface than the soil.
+            assert (target_mask_img(target, points_w)[..., 0] > 0).sum() >= 0.85 * LEAST_MASK_PX
+    renderer.close()
 
 
 @pytest.mark.parametrize("soil", SOILS)

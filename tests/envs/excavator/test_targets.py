@@ -37,5 +37,5 @@ def test_mask_is_white_where_the_surface_point_is_in_the_patch():
 
 def test_flat_ground_offers_no_target():
     x_w, y_w = cell_centres_w()
-    with pytest.raises(TooFewTargetsError, match="0 dig regions, 4"):
+    with pytest.raises(TooFewTargetsError, match="no room for 4 dig regions"):
         find_targets(np.zeros((x_w.size, y_w.size)), x_w, y_w, np.random.default_rng(0))
