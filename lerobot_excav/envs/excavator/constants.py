@@ -157,16 +157,6 @@ SERVO_DEFLECTION_RAD = _constant(
 
 # --- coupling to soil and box -----------------------------------------------------------------------
 
-RESISTANCE_SPEED_M_S = _constant(
-    "RESISTANCE_SPEED_M_S", 0.08, "m/s", "tuned", "speed at which digging resistance is near its full value"
-)
-RESISTANCE_BLEND = _constant(
-    "RESISTANCE_BLEND",
-    0.5,
-    "1",
-    "tuned",
-    "share of the newest reaction; without the blend a bucket near its stall shakes at half the tick rate",
-)
 PAYLOAD_RATE_KG_S = _constant(
     "PAYLOAD_RATE_KG_S", 20e3, "kg/s", "tuned", "20 kg per ms: the payload grows without a kick"
 )

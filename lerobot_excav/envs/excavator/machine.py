@@ -96,12 +96,14 @@ class ExcavatorMachine:
         """
         command = checked_action(action).tolist()
         model, data = self.model, self.data
-        self._resistance.set_reaction(reaction)
+        self._resistance.set_reaction(reaction, data)
         self._box_contact_force_n = 0.0
         for remaining in range(SUBSTEPS, 0, -1):
             self._payload.approach(reaction.payload_mass_kg, reaction.payload_com_t, remaining)
             data.ctrl[:] = self._control.step(command, data.qpos.tolist(), const.SUBSTEP_S)
             mujoco.mj_step1(model, data)
+            data.qfrc_applied[:] = 0.0
+            self._payload.apply_momentum(data)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)
             self._box_contact_force_n = max(self._box_contact_force_n, self._box_force_now_n())

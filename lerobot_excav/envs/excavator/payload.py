@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator import constants as const
 
+Array = NDArray[np.float64]
+
 # Moments of inertia of a unit mass from its radii of gyration: Ixx = ky^2 + kz^2 and so on.
 _UNIT_INERTIA_M2 = (np.ones((3, 3)) - np.eye(3)) @ np.array(const.PAYLOAD_GYRATION_M) ** 2
 
@@ -26,17 +28,17 @@ class Payload:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._body = model.body("payload").id
-        self.mass_kg = 0.0
-        self._com_t = np.array(const.BUCKET_COM_T)
+        self._jacobian = np.zeros((6, model.nv))
         self.reset()
 
     def reset(self) -> None:
         """Empty the bucket at once."""
         self.mass_kg = 0.0
         self._com_t = np.array(const.BUCKET_COM_T)
+        self._before = (0.0, self._com_t.copy())
         self._write()
 
-    def approach(self, mass_kg: float, com_t: NDArray[np.float64], substeps: int) -> None:
+    def approach(self, mass_kg: float, com_t: Array, substeps: int) -> None:
         """Move mass and centre of mass one substep closer to those of the soil.
 
         Args:
@@ -44,6 +46,7 @@ class Payload:
             com_t: Its centre of mass, tool frame, shape (3,) [m].
             substeps: How many substeps there are left to arrive, this one included.
         """
+        self._before = (self.mass_kg, self._com_t.copy())
         if mass_kg == self.mass_kg == 0.0:
             return
         # A jump of the mass would kick the joints; its rate is bounded, so a large change may take longer.
@@ -52,6 +55,26 @@ class Payload:
         if mass_kg > 0.0:
             self._com_t += (np.asarray(com_t) - self._com_t) / substeps
         self._write()
+
+    def apply_momentum(self, data: mujoco.MjData) -> None:
+        """Add to `qfrc_applied` what the last `approach` costs; call it between `mj_step1` and `mj_step2`.
+
+        Soil joins the bucket at rest and takes its momentum from it; soil that leaves keeps its own, so the bucket
+        feels nothing. Soil that shifts inside arrives with the velocity of its old place. As in any inelastic
+        impact, no kinetic energy is gained.
+        """
+        mass_before, com_before = self._before
+        kept_kg = min(mass_before, self.mass_kg)
+        if kept_kg == self.mass_kg and np.array_equal(com_before, self._com_t):
+            return
+        mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._body)
+        rotation = data.xmat[self._body].reshape(3, 3)
+        linear, angular = self._jacobian[:3], self._jacobian[3:]
+        now = linear + np.cross(angular, rotation @ self._com_t, axis=0)
+        before = linear + np.cross(angular, rotation @ com_before, axis=0)
+        momentum = (self.mass_kg * now - kept_kg * before) @ data.qvel
+        spin = (self.mass_kg - kept_kg) * _UNIT_INERTIA_M2 * (rotation.T @ angular @ data.qvel)
+        data.qfrc_applied[:] -= (now.T @ momentum + angular.T @ (rotation @ spin)) / const.SUBSTEP_S
 
     def _write(self) -> None:
         self._model.body_mass[self._body] = self.mass_kg

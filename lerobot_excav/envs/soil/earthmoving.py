@@ -82,12 +82,13 @@ def failure_angle(rake_rad: float, friction_rad: float, steel_rad: float) -> flo
 
 @cache
 def failure_table(friction_rad: float, steel_rad: float) -> Array:
-    """Return (n, 3) rows of rake [rad], failure angle [rad] and cohesion factor, by 1 degree of rake."""
+    """Return (n, 4) rows of rake [rad], failure angle [rad], cohesion and surcharge factor, by 1 degree of rake."""
     count = round(math.degrees(RAKE_MAX_RAD - RAKE_MIN_RAD)) + 1
     rows = []
     for rake in np.linspace(RAKE_MIN_RAD, RAKE_MAX_RAD, count):
         angle = failure_angle(rake, friction_rad, steel_rad)
-        rows.append((rake, angle, earthmoving_factors(rake, angle, friction_rad, steel_rad).cohesion))
+        factors = earthmoving_factors(rake, angle, friction_rad, steel_rad)
+        rows.append((rake, angle, factors.cohesion, factors.surcharge))
     table = np.array(rows)
     table.flags.writeable = False  # every soil of the same friction shares it
     return table

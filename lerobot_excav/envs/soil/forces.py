@@ -1,9 +1,8 @@
-"""Digging resistance on the cutting edge: a wedge before each lateral slice and the bearing of the edge.
+"""Digging resistance: what the soil can hold against a bucket at its present pose.
 
-The wedge is weighed in the height field itself, so heaps and slopes ahead of the bucket count. It acts when the
-bottom plate moves towards its soil side, the bearing when the edge moves ahead. Both fade out with the speed of the
-edge and neither ever drives it: the power on the edge is at most zero. Soil that the shell pushes (reversing,
-heel contact) gives no force.
+Three kinds of patches (`PatchKind`): the wedge before each lateral slice of the cutting edge, the bearing of the
+slice, and the pressure on the outer faces of the plates. Their limits depend on pose and ground only, not on the
+motion: that decides how much of them acts, see `patches`.
 """
 
 import math
@@ -11,234 +10,173 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD, failure_table
-from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
+from lerobot_excav.envs.soil.earthmoving import failure_table
+from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, SoilParameters
-from lerobot_excav.envs.soil.tool import Tool
+from lerobot_excav.envs.soil.patches import Patches, PatchKind
+from lerobot_excav.envs.soil.plates import OuterFaces
+from lerobot_excav.envs.soil.pressure import PlatePressure
+from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
+from lerobot_excav.envs.soil.wedge import SoilNumbers, edge_limits
 
 Array = NDArray[np.float64]
 
-EDGE_THICKNESS_M = 0.02
-"""Thickness of the cutting edge (guess, typical of 8-t buckets)."""
 
-TEETH_AREA_PER_WIDTH_M = 5 * 0.060 * 0.015 / 0.70
-"""Frontal area of the teeth per width of edge: 5 teeth of 60 x 15 mm on 0.7 m (guess, typical of 8-t buckets)."""
-
-FULL_PENETRATION_DEPTH_M = 0.2
-"""Depth over which the bearing grows from 10 to 100 % (AGX Terrain, Unity default)."""
-
-PENETRATION_CAP_N = 30e3
-"""Upper limit of the bearing of the whole edge (AGX users' setting for a machine of this class)."""
-
-FULL_SPEED_M_S = 0.1
-"""Speed scale of the fade-out of resistance at rest (AGX activation speed; the tanh is our own)."""
-
-FULL_INCIDENCE = 0.2
-"""Share of the speed across the plate from which on the wedge acts fully (guess)."""
-
-_WEDGE_REACH_M = 4.0
-"""Longest failure plane followed through the height field."""
-
-
-def bearing_factors(friction_rad: float) -> tuple[float, float]:
-    """Return the bearing capacity factors of depth and of width (Prandtl-Reissner, Vesic 1973)."""
+def bearing_factors(friction_rad: float) -> tuple[float, float, float]:
+    """Return the bearing capacity factors of cohesion, depth and width (Prandtl-Reissner, Vesic 1973)."""
     depth = math.exp(math.pi * math.tan(friction_rad)) * math.tan(math.pi / 4 + friction_rad / 2) ** 2
-    return depth, 2.0 * (depth + 1.0) * math.tan(friction_rad)
-
-
-@kernel
-def wedge_area(
-    heights: Array, grid: Grid, edge: tuple[float, float, float], ahead: tuple[float, float], failure: float
-) -> float:
-    """Return the area [m2] between failure plane and surface ahead of the edge, to where they first meet.
-
-    The surface within one cell of the edge is read one cell ahead: nearer, the bucket has taken it already.
-    """
-    step = 0.5 * grid[2]
-    area, reach = 0.0, 0.0
-    thickness = (
-        surface_height(heights, grid, edge[0] + ahead[0] * grid[2], edge[1] + ahead[1] * grid[2]) - edge[2]
-    )
-    while thickness > 0.0 and reach < _WEDGE_REACH_M:
-        reach += step
-        level = max(reach, grid[2])
-        x, y = edge[0] + ahead[0] * level, edge[1] + ahead[1] * level
-        following = surface_height(heights, grid, x, y) - edge[2] - reach * math.tan(failure)
-        if following > 0.0:
-            area += 0.5 * (thickness + following) * step
-        else:
-            area += 0.5 * thickness * step * thickness / (thickness - following)
-        thickness = following
-    return area
-
-
-@kernel
-def _interpolate(table: Array, rake: float) -> tuple[float, float]:
-    """Return failure angle and cohesion factor at a rake inside the evenly spaced table."""
-    last = len(table) - 1
-    position = (rake - table[0, 0]) / (table[last, 0] - table[0, 0]) * last
-    k = min(int(position), last - 1)
-    f = position - k
-    return table[k, 1] + f * (table[k + 1, 1] - table[k, 1]), table[k, 2] + f * (
-        table[k + 1, 2] - table[k, 2]
+    return (
+        (depth - 1.0) / math.tan(friction_rad),
+        depth,
+        2.0 * (depth + 1.0) * math.tan(friction_rad),
     )
 
 
-@kernel
-def slice_force(
-    heights: Array,
-    grid: Grid,
-    edge: tuple[float, float, float],
-    velocity: Array,
-    plate: tuple[Array, Array],
-    ahead: tuple[float, float],
-    width: float,
-    soil: Array,
-    table: Array,
-    cap: float,
-) -> Array:
-    """Return the resistance [N] on one slice of the edge, in the world.
+def soil_numbers(parameters: SoilParameters) -> SoilNumbers:
+    """Return the numbers of a soil in the form in which kernels take them."""
+    p = parameters
+    cohesion, depth, width = bearing_factors(p.friction_angle_rad)
+    return (
+        p.density_kg_m3 * GRAVITY_M_S2,
+        p.friction_angle_rad,
+        p.steel_friction_angle_rad,
+        p.cohesion_pa,
+        cohesion,
+        depth,
+        width,
+        p.penetration_scale,
+    )
+
+
+def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, width_m: float) -> Array:
+    """Return the force on a flat blade that is pushed through level soil, by the kernels that the bucket uses.
+
+    The blade is thin: its edge has no bearing. No heap lies before it.
 
     Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        edge: Middle of the slice; z above the rigid floor.
-        velocity: (3,) of the edge there [m/s].
-        plate: Unit vectors (3,) from the edge up the bottom plate, and across it to its soil side.
-        ahead: Level unit direction in which soil lies before the edge.
-        width: Width of the slice [m].
-        soil: (7,) unit weight, friction, soil-steel friction, cohesion, the two bearing factors and the scale.
-        table: (n, 3) rake, failure angle and cohesion factor.
-        cap: Upper limit of the bearing [N].
-    """
-    force = np.zeros(3)
-    depth = (
-        surface_height(heights, grid, edge[0] + ahead[0] * grid[2], edge[1] + ahead[1] * grid[2]) - edge[2]
-    )
-    speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-    if depth <= 0.0 or speed < 1e-9 or not in_grid(heights, grid, edge[0], edge[1]):
-        return force
-    unit = velocity / speed
-    along, across = plate
-    rake = math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1]))
-    rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
-    failure, cohesion_factor = _interpolate(table, rake)
-    area = wedge_area(heights, grid, edge, ahead, failure) + 0.5 * depth**2 / math.tan(rake)
-    push = soil[0] * area * width * math.sin(failure + soil[1]) / math.sin(rake + soil[2] + failure + soil[1])
-    push += soil[3] * depth * width * cohesion_factor
-    incidence = unit[0] * across[0] + unit[1] * across[1] + unit[2] * across[2]
-    push *= min(max(incidence / FULL_INCIDENCE, 0.0), 1.0)
-    force[0] = -push * math.sin(rake + soil[2]) * ahead[0]
-    force[1] = -push * math.sin(rake + soil[2]) * ahead[1]
-    force[2] = -push * math.cos(rake + soil[2])
-    bearing = soil[0] * depth * soil[4]
-    bearing += 0.5 * soil[0] * EDGE_THICKNESS_M * soil[5] * min(1.0, depth / EDGE_THICKNESS_M)
-    bearing *= 0.1 + 0.9 * min(1.0, depth / FULL_PENETRATION_DEPTH_M)
-    bearing *= soil[6] * (EDGE_THICKNESS_M + TEETH_AREA_PER_WIDTH_M) * width
-    bearing = min(bearing, cap)
-    ahead_share = -(unit[0] * along[0] + unit[1] * along[1] + unit[2] * along[2])
-    force -= unit * bearing * max(ahead_share, 0.0)
-    force *= math.tanh(speed / FULL_SPEED_M_S)
-    power = force[0] * unit[0] + force[1] * unit[1] + force[2] * unit[2]
-    if power > 0.0:
-        force -= unit * power
-    return force
-
-
-@kernel
-def edge_wrench(
-    heights: Array,
-    grid: Grid,
-    frame: tuple[Array, Array, Array, Array],
-    edge_t: tuple[float, float],
-    plate: tuple[Array, Array],
-    ahead: tuple[float, float],
-    width: float,
-    slices: int,
-    soil: Array,
-    table: Array,
-) -> tuple[Array, Array]:
-    """Add up the slices of the edge.
-
-    Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        frame: Position, rotation, linear and angular velocity of the tool; z above the rigid floor.
-        edge_t: x_t and z_t of the cutting edge.
-        plate: As in `slice_force`.
-        ahead: As in `slice_force`.
-        width: Width of the edge [m].
-        slices: Number of slices.
-        soil: As in `slice_force`.
-        table: As in `slice_force`.
+        parameters: The soil.
+        depth_m: Depth of the edge below the surface [m].
+        rake_rad: Angle of the blade from the horizontal [rad].
+        width_m: Width of the blade [m].
 
     Returns:
-        Force [N] and torque about the tool origin [N m], both (3,) in the world.
+        Backward and downward part [N], shape (2,).
     """
-    position, rotation, linear, angular = frame
-    force, torque = np.zeros(3), np.zeros(3)
-    arm, velocity = np.zeros(3), np.zeros(3)
-    for k in range(slices):
-        y = ((k + 0.5) / slices - 0.5) * width
-        for a in range(3):
-            arm[a] = rotation[a, 0] * edge_t[0] + rotation[a, 1] * y + rotation[a, 2] * edge_t[1]
-        for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            velocity[a] = linear[a] + angular[b] * arm[c] - angular[c] * arm[b]
-        edge = (position[0] + arm[0], position[1] + arm[1], position[2] + arm[2])
-        cap = PENETRATION_CAP_N / slices
-        part = slice_force(heights, grid, edge, velocity, plate, ahead, width / slices, soil, table, cap)
-        for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            force[a] += part[a]
-            torque[a] += arm[b] * part[c] - arm[c] * part[b]
-    return force, torque
+    p = parameters
+    spacing = depth_m / 100.0
+    level: Array = np.full((2, 2), depth_m)
+    grid = (-spacing, -spacing, 2.0 * spacing, 2.0 * spacing)
+    table = failure_table(p.friction_angle_rad, p.steel_friction_angle_rad)
+    wedges, _ = edge_limits(
+        level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_numbers(p), table
+    )
+    angle = rake_rad + p.steel_friction_angle_rad
+    return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
 
 
 class DiggingResistance:
-    """Force and torque of the soil on a bucket."""
+    """Reaction of the soil to a bucket.
+
+    Args:
+        parameters: The soil.
+        slices: Lateral slices of the cutting edge; the plates have half as many rows of patches.
+    """
 
     def __init__(self, parameters: SoilParameters, slices: int) -> None:
-        """Tabulate the failure angles of a soil."""
-        p = parameters
         self._slices = slices
-        self._table = np.array(failure_table(p.friction_angle_rad, p.steel_friction_angle_rad))
-        weight = p.density_kg_m3 * GRAVITY_M_S2
-        friction = (p.friction_angle_rad, p.steel_friction_angle_rad, p.cohesion_pa)
-        self._soil = np.array(
-            [weight, *friction, *bearing_factors(p.friction_angle_rad), p.penetration_scale]
+        self._soil = soil_numbers(parameters)
+        self._table = failure_table(parameters.friction_angle_rad, parameters.steel_friction_angle_rad)
+        self.forget()
+
+    def forget(self) -> None:
+        """Take note that the tool is gone, or that the ground is new."""
+        self._pressure: PlatePressure | None = None
+        self._geometry: ToolGeometry | None = None
+
+    def react(
+        self,
+        heights_m: Array,
+        weighed_heights_m: Array,
+        grid: Grid,
+        tool: Tool,
+        floor_depth_m: float,
+        dt_s: float,
+        payload_mass_kg: float,
+        payload_com_t: Array,
+    ) -> Reaction:
+        """Return what the soil does to the tool where it is now.
+
+        To be called in every step: how far the plates have sunk in follows from one call to the next.
+
+        Args:
+            heights_m: (nx, ny) heights of the ground above the rigid floor.
+            weighed_heights_m: (nx, ny) the same with loose soil that lies on it, which the wedge must lift too.
+            grid: First cell centre and cell sizes.
+            tool: The bucket.
+            floor_depth_m: Depth of the rigid floor below z = 0.
+            dt_s: Time since the last call [s].
+            payload_mass_kg: Soil in the bucket, as the reaction shall say.
+            payload_com_t: (3,) its centre of mass, likewise.
+        """
+        patches = Patches.joined(
+            *self._edge(heights_m, weighed_heights_m, grid, tool, floor_depth_m),
+            self._plates(tool.geometry).patches(heights_m, grid, tool, floor_depth_m, dt_s),
+        )
+        force, torque = patches.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
+        return Reaction(
+            force_w_n=force,
+            torque_w_nm=torque,
+            payload_mass_kg=payload_mass_kg,
+            payload_com_t=payload_com_t,
+            patches=patches,
         )
 
-    def wrench(self, heights: Array, grid: Grid, tool: Tool, floor_depth_m: float) -> tuple[Array, Array]:
-        """Return force [N] and torque about the tool origin [N m], both (3,) in the world."""
-        position, rotation = np.array(tool.position_w), np.array(tool.rotation_w)
-        position[2] += floor_depth_m
-        frame = (position, rotation, np.array(tool.linear_velocity_w), np.array(tool.angular_velocity_w))
-        geometry = tool.geometry
+    def _plates(self, geometry: ToolGeometry) -> PlatePressure:
+        if self._pressure is None or self._geometry is not geometry:
+            self._geometry = geometry
+            faces = OuterFaces.of(geometry, max(2, self._slices // 2))
+            self._pressure = PlatePressure(faces, self._soil, self._table)
+        return self._pressure
+
+    def _edge(
+        self, heights_m: Array, weighed_heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float
+    ) -> tuple[Patches, Patches]:
+        """Return wedges and bearings of the slices of the edge."""
+        geometry, rotation = tool.geometry, tool.rotation_w
         first, second = geometry.profile_t[0], geometry.profile_t[1]
         along_t = np.array([second[0] - first[0], 0.0, second[1] - first[1]])
         along = rotation @ (along_t / np.linalg.norm(along_t))
         across = rotation @ -geometry.planes_t[1, :3]
-        force, torque = edge_wrench(
-            heights,
+        ahead = _ahead(rotation, along)
+        lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
+        edges_t = np.stack(
+            [np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1
+        )
+        edges = tool.position_w + edges_t @ rotation.T
+        wedges, bearings = edge_limits(
+            heights_m,
+            weighed_heights_m,
             grid,
-            frame,
-            (float(first[0]), float(first[1])),
-            (along, across),
-            self._ahead(rotation, along),
+            edges + np.array([0.0, 0.0, floor_depth_m]),
+            math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1])),
+            ahead,
             geometry.inner_width_m,
-            self._slices,
             self._soil,
             self._table,
         )
-        return force, torque
+        steel, shape = self._soil[2], edges.shape
+        # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
+        pushes = wedges * math.cos(steel)
+        return (
+            Patches.alike(edges, np.broadcast_to(-across, shape), pushes, math.tan(steel), PatchKind.WEDGE),
+            Patches.alike(edges, np.broadcast_to(along, shape), bearings, 0.0, PatchKind.PENETRATION),
+        )
 
-    @staticmethod
-    def _ahead(rotation: Array, along: Array) -> tuple[float, float]:
-        """Return the level direction half-way between the line of the plate and the outside of the opening."""
-        level = -(along + rotation[:, 2])[:2]
-        length = float(np.hypot(*level))
-        if length < 1e-9:
-            return 1.0, 0.0
-        return float(level[0] / length), float(level[1] / length)
+
+def _ahead(rotation: Array, along: Array) -> tuple[float, float]:
+    """Return the level direction half-way between the line of the plate and the outside of the opening."""
+    level = -(along + rotation[:, 2])[:2]
+    length = float(np.hypot(*level))
+    if length < 1e-9:
+        return 1.0, 0.0
+    return float(level[0] / length), float(level[1] / length)

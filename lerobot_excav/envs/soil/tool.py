@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.errors import require
 
 Array = NDArray[np.float64]
@@ -139,13 +140,27 @@ class Reaction:
     """What the soil does to the tool in one step.
 
     Attributes:
-        force_w_n: (3,) digging resistance [N]; the weight of the payload is not in it.
+        force_w_n: (3,) digging resistance [N] at the tool's present velocity, if nothing hinders its motion; the
+            weight of the payload is not in it.
         torque_w_nm: (3,) its torque about the tool origin [N m].
         payload_mass_kg: Mass of the soil in the bucket.
         payload_com_t: (3,) its centre of mass [m]; the centroid of the bucket while that is empty.
+        patches: What the soil can hold against any other motion, for a machine that solves for its own.
     """
 
     force_w_n: Array
     torque_w_nm: Array
     payload_mass_kg: float
     payload_com_t: Array
+    patches: Patches
+
+    @classmethod
+    def free(cls, payload_mass_kg: float, payload_com_t: Array) -> "Reaction":
+        """Return the reaction of soil that the tool does not touch."""
+        return cls(
+            force_w_n=np.zeros(3),
+            torque_w_nm=np.zeros(3),
+            payload_mass_kg=payload_mass_kg,
+            payload_com_t=payload_com_t,
+            patches=Patches.none(),
+        )

@@ -1,0 +1,152 @@
+"""What soil can hold against a tool: small patches, each a one-sided brake with a limit.
+
+A patch pushes along its normal with any force from zero to its limit, as much as it takes to stop the tool's
+approach, and rubs across the normal with at most the friction coefficient times that push. So the soil's answer to
+a motion is the admissible force that takes the most power from it (rate-independent plasticity): it has no
+preferred direction of its own to jump to, can hold a tool at rest and never drives one.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+
+Array = NDArray[np.float64]
+
+FULL_SHARE = 0.2
+"""Share of the speed into a patch, or across it, from which on `Patches.wrench` gives the full force (guess)."""
+
+REST_SPEED_M_S = 1e-3
+"""Speed below which `Patches.wrench` fades out: numerical, far below any digging speed (guess)."""
+
+
+class PatchKind(IntEnum):
+    """Where the limit of a patch comes from."""
+
+    WEDGE = 0
+    """Soil ahead of the plate that must fail along a plane before the plate can move into it."""
+
+    PENETRATION = 1
+    """Bearing of the cutting edge and the teeth against motion along the plate."""
+
+    PRESSURE = 2
+    """Soil that stands against the outer face of a plate."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Patches:
+    """Resistance that the soil can offer to a tool.
+
+    Attributes:
+        points_w: (k, 3) points of the tool [m].
+        normals_w: (k, 3) unit directions in which the soil pushes the tool.
+        limits_n: (k,) greatest push [N], above zero.
+        frictions: (k,) friction coefficient across the normal.
+        kinds: (k,) `PatchKind`.
+    """
+
+    points_w: Array
+    normals_w: Array
+    limits_n: Array
+    frictions: Array
+    kinds: NDArray[np.int8]
+
+    @classmethod
+    def none(cls) -> "Patches":
+        """Return no resistance at all."""
+        return cls.alike(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), 0.0, PatchKind.WEDGE)
+
+    @classmethod
+    def alike(
+        cls, points_w: Array, normals_w: Array, limits_n: Array, friction: float, kind: PatchKind
+    ) -> "Patches":
+        """Return patches of one kind and one friction coefficient; those without a limit above zero are left out."""
+        holds = limits_n > 0.0
+        count = int(holds.sum())
+        return cls(
+            points_w=points_w[holds],
+            normals_w=normals_w[holds],
+            limits_n=limits_n[holds],
+            frictions=np.full(count, friction),
+            kinds=np.full(count, kind, dtype=np.int8),
+        )
+
+    @classmethod
+    def joined(cls, *parts: "Patches") -> "Patches":
+        """Return the patches of all parts."""
+        return cls(
+            points_w=np.concatenate([part.points_w for part in parts]),
+            normals_w=np.concatenate([part.normals_w for part in parts]),
+            limits_n=np.concatenate([part.limits_n for part in parts]),
+            frictions=np.concatenate([part.frictions for part in parts]),
+            kinds=np.concatenate([part.kinds for part in parts]),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of patches."""
+        return len(self.limits_n)
+
+    @property
+    def full_forces_w_n(self) -> Array:
+        """(k, 3) pushes at their limits [N], without friction."""
+        return np.asarray(self.limits_n[:, None] * self.normals_w)
+
+    def of_kind(self, kind: PatchKind) -> "Patches":
+        """Return the patches of one kind."""
+        chosen = self.kinds == kind
+        return Patches(
+            points_w=self.points_w[chosen],
+            normals_w=self.normals_w[chosen],
+            limits_n=self.limits_n[chosen],
+            frictions=self.frictions[chosen],
+            kinds=self.kinds[chosen],
+        )
+
+    def wrench(
+        self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array
+    ) -> tuple[Array, Array]:
+        """Return force [N] and torque about the origin [N m] on a tool that moves on unhindered, both (3,).
+
+        Every push and every friction force is full from a share `FULL_SHARE` of the speed on, and in between
+        proportional to it, so the wrench is continuous in the motion. Its power is never positive.
+        """
+        return patch_wrench(
+            self.points_w,
+            self.normals_w,
+            self.limits_n,
+            self.frictions,
+            np.array(origin_w),
+            np.array(linear_velocity_w),
+            np.array(angular_velocity_w),
+        )
+
+
+@kernel
+def patch_wrench(
+    points: Array,
+    normals: Array,
+    limits: Array,
+    frictions: Array,
+    origin: Array,
+    linear: Array,
+    angular: Array,
+) -> tuple[Array, Array]:
+    """Add up the forces of patches on a moving tool; arguments and result as in `Patches.wrench`."""
+    force, torque = np.zeros(3), np.zeros(3)
+    for k in range(len(limits)):
+        arm = points[k] - origin
+        velocity = linear + np.cross(angular, arm)
+        speed = np.sqrt(np.sum(velocity * velocity) + REST_SPEED_M_S**2)
+        approach = -np.sum(velocity * normals[k])
+        if approach <= 0.0:
+            continue
+        push = limits[k] * min(1.0, approach / (FULL_SHARE * speed))
+        across = velocity + approach * normals[k]
+        sliding = np.sqrt(np.sum(across * across))
+        part = push * (normals[k] - frictions[k] * across / max(sliding, FULL_SHARE * speed))
+        force += part
+        torque += np.cross(arm, part)
+    return force, torque

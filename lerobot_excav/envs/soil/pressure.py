@@ -1,0 +1,117 @@
+"""Pressure of the ground on the outer faces of the plates: bottom, back and side plates.
+
+An upright face finds the passive pressure of the fundamental equation of earthmoving, spread over its depth. A face
+that leans over the soil sinks into it: the pressure grows with the sinkage as Bekker measured (k z^n), up to the
+bearing capacity (Vesic 1973). In between, this counts by the square of the downward part of the normal (guess).
+
+Any pressure starts from zero at contact and is whole where the soil overlaps the outer face by the thickness of the
+plate: the cut clears the inside of the plates, so soil that touches one reaches as deep into its outer face.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
+from lerobot_excav.envs.soil.patches import Patches, PatchKind
+from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
+from lerobot_excav.envs.soil.tool import Tool
+from lerobot_excav.envs.soil.wedge import SoilNumbers, table_row
+
+Array = NDArray[np.float64]
+
+SINKAGE_MODULUS = 1.53e6
+"""Pressure at 1 m of sinkage [N/m^(n+2)] of a plate in dry sand; the part that depends on its breadth is below 1 %
+(paper: LLL dry sand, Wong, Theory of Ground Vehicles, table of Bekker parameters)."""
+
+SINKAGE_EXPONENT = 1.1
+"""Exponent n of the same."""
+
+
+@kernel
+def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) -> Array:
+    """Return how far the soil before each sample of the outer faces stands above it [m], at least 0.
+
+    It is read one cell outside of the face, in so far as the face is upright.
+
+    Args:
+        heights: (nx, ny) heights [m].
+        grid: First cell centre and cell sizes.
+        points: (m, 3) samples; z above the rigid floor.
+        normals: (m, 3) unit vectors out of the bucket.
+    """
+    overlaps = np.zeros(len(points))
+    for k in range(len(points)):
+        x, y = points[k, 0] + grid[2] * normals[k, 0], points[k, 1] + grid[2] * normals[k, 1]
+        if in_grid(heights, grid, x, y):
+            overlaps[k] = max(0.0, surface_height(heights, grid, x, y) - points[k, 2])
+    return overlaps
+
+
+@kernel
+def plate_limits(
+    overlaps: Array,
+    sinkages: Array,
+    normals: Array,
+    areas: Array,
+    breadths: Array,
+    soil: SoilNumbers,
+    table: Array,
+) -> Array:
+    """Return the greatest push [N] of the soil on each sample of the outer faces.
+
+    Args:
+        overlaps: (m,) height of the soil above each sample [m].
+        sinkages: (m,) way that each has gone into the soil since it met it [m].
+        normals: (m, 3) unit vectors out of the bucket.
+        areas: (m,) [m2].
+        breadths: (m,) shares of the breadth of the footing [m].
+        soil: Numbers of the soil.
+        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
+    """
+    limits = np.zeros(len(overlaps))
+    contacts = np.minimum(1.0, overlaps / PLATE_THICKNESS_M)
+    footing = np.sum(breadths * contacts * np.maximum(0.0, -normals[:, 2]))
+    for k in range(len(overlaps)):
+        if overlaps[k] > 0.0:
+            upright = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
+            _, cohesion, surcharge = table_row(table, math.atan2(upright, normals[k, 2]))
+            passive = (soil[0] * overlaps[k] * surcharge + soil[3] * cohesion) * math.cos(soil[2])
+            capacity = soil[0] * (overlaps[k] * soil[5] + 0.5 * footing * soil[6]) + soil[3] * soil[4]
+            bearing = min(SINKAGE_MODULUS * sinkages[k] ** SINKAGE_EXPONENT, capacity)
+            downward = max(0.0, -normals[k, 2]) ** 2
+            limits[k] = areas[k] * contacts[k] * (passive + downward * (bearing - passive))
+    return limits
+
+
+class PlatePressure:
+    """Pressure on the plates of one bucket, which remembers how far each has sunk in.
+
+    Args:
+        faces: Samples of its outer faces.
+        soil: Numbers of the soil.
+        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
+    """
+
+    def __init__(self, faces: OuterFaces, soil: SoilNumbers, table: Array) -> None:
+        self._faces = faces
+        self._soil = soil
+        self._table = table
+        self._sinkages: Array = np.zeros(len(faces.areas_m2))
+
+    def patches(self, heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, dt_s: float) -> Patches:
+        """Return what the ground can hold against the plates; arguments as in `DiggingResistance.react`."""
+        faces = self._faces
+        arms = faces.points_t @ tool.rotation_w.T
+        normals = faces.normals_t @ tool.rotation_w.T
+        points = tool.position_w + arms
+        overlaps = plate_overlaps(heights_m, grid, points + np.array([0.0, 0.0, floor_depth_m]), normals)
+        velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
+        sunk = self._sinkages + dt_s * np.einsum("ij,ij->i", velocities, normals)
+        self._sinkages = np.where(overlaps > 0.0, np.maximum(0.0, sunk), 0.0)
+        limits = plate_limits(
+            overlaps, self._sinkages, normals, faces.areas_m2, faces.breadths_m, self._soil, self._table
+        )
+        return Patches.alike(points, -normals, limits, math.tan(self._soil[2]), PatchKind.PRESSURE)
