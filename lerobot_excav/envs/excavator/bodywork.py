@@ -14,10 +14,12 @@ _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 WORKING_BIT = 1
 SURROUNDINGS_BIT = 2
 
-# Groups of geoms, by which the renderer hides things.
+# Groups of geoms and skins, by which the renderer hides things.
 SURROUNDINGS_GROUP = 0
 MACHINE_GROUP = 1
+LOOSE_SOIL_GROUP = 2
 COLLISION_GROUP = 3  # never drawn
+HIDDEN_GROUP = 4  # nor is this
 
 Vec = tuple[float, float, float]
 

@@ -31,8 +31,9 @@ sand), so that no dig region hides behind the ridge.
 OVERVIEW = CameraPose(position=(3.0, -6.5, 9.2), target=(-1.4, 1.1, 0.0), fovy_deg=52.0)
 """Fixed to the world, from the same side but wider: machine, dig area and target box. For people, not policies."""
 
-CAB = CameraPose(position=(0.98, 0.62, 1.45), target=(4.8, -0.05, -0.7), fovy_deg=62.0)
-"""Fixed to the house (swing frame, origin on the slewing ring): along the boom down to the dig area."""
+CAB = CameraPose(position=(0.98, 0.75, 2.0), target=(4.8, -0.05, -0.7), fovy_deg=62.0)
+"""Fixed to the house (swing frame, origin on the slewing ring), on a bracket above the cab's windscreen: along the boom
+down to the dig area, and over the wall of the target box to the soil in it."""
 
 
 def axes(pose: CameraPose) -> NDArray[np.float64]:

@@ -12,6 +12,8 @@ from lerobot_excav.envs.excavator.bodywork import (
     WORKING_BIT,
 )
 from lerobot_excav.envs.excavator.cameras import CameraPose
+from lerobot_excav.envs.excavator.grains import add_grains
+from lerobot_excav.envs.excavator.load_picture import add_load
 from lerobot_excav.envs.soil.container import Container
 
 GROUND_DROP_M = 0.02
@@ -31,7 +33,7 @@ def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mu
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
         `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main`, `cab` and
-        `overview`, and the skins `terrain` and `box_soil` that draw the soil.
+        `overview`, and the skins `terrain`, `box_soil`, `load` and `grains_…` that draw the soil.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "excavator"
@@ -42,6 +44,8 @@ def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mu
     _add_machine(spec)
     surfaces.add_terrain(spec, terrain_shape_m)
     surfaces.add_box_soil(spec, container)
+    add_load(spec)
+    add_grains(spec)
     return spec
 
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.bodywork import MACHINE_GROUP, SURROUNDINGS_GROUP
+from lerobot_excav.envs.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.excavator.offscreen import create_context
 from lerobot_excav.envs.excavator.soil_picture import SoilPicture
@@ -14,7 +14,7 @@ from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice
 
 CAMERAS = ("main", "cab", "overview")
-_MAX_GEOMS = 2000
+_MAX_GEOMS = 300
 
 
 class WorksiteRenderer:
@@ -39,7 +39,7 @@ class WorksiteRenderer:
         self._closed = False
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        self._all = _visible_groups(SURROUNDINGS_GROUP, MACHINE_GROUP)
+        self._all = _visible_groups(SURROUNDINGS_GROUP, MACHINE_GROUP, LOOSE_SOIL_GROUP)
         self._without_machine = _visible_groups(SURROUNDINGS_GROUP)
 
     def render(self, camera: str, soil: Soil) -> NDArray[np.uint8]:
@@ -117,13 +117,11 @@ class WorksiteRenderer:
             self._open()
         self._context.make_current()
         model, data = self._machine.model, self._machine.data
-        self._soil_picture.update_skins(soil)
+        self._soil_picture.update(soil)
         self._camera.fixedcamid = model.camera(camera).id
         mujoco.mjv_updateScene(
             model, data, options, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
         )
-        if options is self._all:
-            self._soil_picture.add_moving_soil(self._scene, soil)
         mujoco.mjr_render(self._viewport, self._scene, self._mjr)
 
     def _read_depth(self) -> NDArray[np.float64]:

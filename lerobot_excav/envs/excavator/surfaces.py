@@ -9,12 +9,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.excavator.bodywork import SURROUNDINGS_GROUP
 from lerobot_excav.envs.soil.container import Container
 
 TERRAIN_SKIN = "terrain"
 BOX_SOIL_SKIN = "box_soil"
 _TERRAIN_SPACING_M = 0.1
-_BOX_SOIL_SPACING_M = 0.2
+_BOX_SOIL_SPACING_M = 0.1
 _SKIRT_DEPTH_M = 0.05
 _TEXTURE_PIXELS = 128
 _TEXTURE_PERIOD_M = 2.0
@@ -24,12 +25,12 @@ _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
 def add_terrain(spec: mujoco.MjSpec, shape_m: tuple[float, float]) -> None:
     """Add the skin of the dig area, centred on the world origin."""
     _add_soil_material(spec)
-    _add_skin(spec, TERRAIN_SKIN, "world", terrain_grid(shape_m))
+    add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(shape_m), SURROUNDINGS_GROUP)
 
 
 def add_box_soil(spec: mujoco.MjSpec, container: Container) -> None:
     """Add the skin of the soil in the target box, in the frame of the box."""
-    _add_skin(spec, BOX_SOIL_SKIN, "box", box_grid(container))
+    add_sheet(spec, BOX_SOIL_SKIN, "box", box_grid(container), SURROUNDINGS_GROUP)
 
 
 def terrain_grid(shape_m: tuple[float, float]) -> NDArray[np.float64]:
@@ -43,20 +44,32 @@ def box_grid(container: Container) -> NDArray[np.float64]:
     return _grid((2 * half_x, 2 * half_y), _BOX_SOIL_SPACING_M)
 
 
-def skin_vertices(grid: NDArray[np.float64], heights_m: NDArray[np.float64]) -> NDArray[np.float32]:
+def skin_vertices(
+    grid: NDArray[np.float64],
+    heights_m: NDArray[np.float64],
+    foot_m: float | NDArray[np.float64] = -_SKIRT_DEPTH_M,
+) -> NDArray[np.float32]:
     """Return the vertices of a soil skin: the surface, then a skirt that closes its border downwards.
 
     Args:
         grid: Ground-plane points, shape (nx, ny, 2) [m].
         heights_m: Heights at those points, shape (nx, ny) [m].
+        foot_m: Height of the skirt's foot, one or (nx, ny) [m].
 
     Returns:
         Vertices, shape (nx ny + border, 3).
     """
     top = np.concatenate([grid, heights_m[..., None]], axis=-1).reshape(-1, 3)
-    skirt = top[_border(heights_m.shape)]
-    skirt[:, 2] = -_SKIRT_DEPTH_M
+    border = _border(heights_m.shape)
+    skirt = top[border]
+    skirt[:, 2] = np.broadcast_to(foot_m, heights_m.shape).ravel()[border]
     return np.concatenate([top, skirt], dtype=np.float32)
+
+
+def write_skin(model: mujoco.MjModel, name: str, vertices: NDArray[np.float32]) -> None:
+    """Move the vertices of a skin of a model."""
+    start = model.skin_vertadr[model.skin(name).id]
+    model.skin_vert[start : start + len(vertices)] = vertices
 
 
 def _grid(shape_m: tuple[float, float], spacing_m: float) -> NDArray[np.float64]:
@@ -83,10 +96,19 @@ def _faces(shape: tuple[int, ...]) -> NDArray[np.int32]:
     return np.concatenate([top, skirt], dtype=np.int32)
 
 
-def _add_skin(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float64]) -> None:
+def add_sheet(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float64], group: int) -> None:
+    """Add a skin of the soil's material: a level sheet with its skirt, which moves with a body.
+
+    Args:
+        spec: The model.
+        name: Name of the skin.
+        body: Name of the body in whose frame the vertices are.
+        grid: Vertices of the sheet, shape (nx, ny, 2) [m], counter-clockwise where they are seen from.
+        group: Drawing group.
+    """
     shape = grid.shape[:2]
     vertices = skin_vertices(grid, np.zeros(shape))
-    skin = spec.add_skin(name=name, material="soil", group=0)
+    skin = spec.add_skin(name=name, material="soil", group=group)
     skin.vert = vertices.ravel().tolist()
     skin.texcoord = (vertices[:, :2] / _TEXTURE_PERIOD_M).ravel().tolist()
     skin.face = _faces(shape).ravel().tolist()

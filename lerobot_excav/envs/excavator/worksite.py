@@ -16,6 +16,12 @@ class Worksite:
     Args:
         soil: Name of the soil preset.
         fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
+
+    Attributes:
+        machine: The excavator.
+        soil: The soil, with the box.
+        time_s: Time since the reset.
+        reaction: What the soil did to the bucket in the last tick; None before the first one.
     """
 
     def __init__(self, *, soil: str = "sand", fidelity: str = "standard") -> None:
@@ -28,6 +34,7 @@ class Worksite:
             container=TARGET_BOX,
         )
         self.time_s = 0.0
+        self.reaction: Reaction | None = None
         self._ticks = 0
 
     def reset(self, scene: Scene) -> None:
@@ -36,6 +43,7 @@ class Worksite:
         self.machine.reset(scene.joint_pos)
         self.soil.reset(scene.heights_m)
         self._ticks, self.time_s = 0, 0.0
+        self.reaction = None
 
     def tick(self, action: NDArray[np.float64]) -> Reaction:
         """Advance by `TICK_S` under joystick commands.
@@ -48,6 +56,7 @@ class Worksite:
         """
         reaction = self.soil.step(TICK_S, self.machine.tool())
         self.machine.tick(action, reaction)
+        self.reaction = reaction
         self._ticks += 1
         self.time_s = self._ticks * TICK_S
         return reaction

@@ -59,6 +59,15 @@ def test_overview_sees_the_whole_dig_area_the_box_and_the_raised_boom():
     )
 
 
+def test_cab_sees_the_middle_of_the_box_over_its_wall():
+    eye = np.array([*const.MACHINE_POS_W[:2], const.SWING_HEIGHT_M + CAB.position[2]])
+    to_box = TARGET_BOX.center_w[:2] - eye[:2]
+    distance = np.hypot(*to_box) - CAB.position[0]
+    wall = distance - TARGET_BOX.half_extent_m.min() - const.BOX_WALL_THICKNESS_M
+    line_of_sight = eye[2] + (TARGET_BOX.wall_height_m - eye[2]) * distance / wall
+    assert line_of_sight < 0.4  # the height of one scoop's heap
+
+
 @pytest.mark.parametrize("x", [-1.5, 0.0, 1.5])
 @pytest.mark.parametrize("y", [-1.5, 0.0, 1.5])
 def test_dig_region_is_large_enough_in_the_default_picture(x, y):

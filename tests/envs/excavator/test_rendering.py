@@ -12,6 +12,8 @@ from lerobot_excav.errors import ConfigurationError, RenderingError
 HEIGHT, WIDTH = 96, 128
 AWAY = np.array([-2.8, 0.9, -1.0, -1.5])  # behind itself, out of the picture of the dig area
 OVER_PILE = np.array([0.0, 0.5, -1.4, -1.0])
+CARRYING = np.array([0.3, 0.5, -1.9, -1.9])
+DUMPING = np.array([1.39, 0.85, -1.5, -0.9])
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +160,48 @@ def test_flying_parcels_are_drawn(machine, renderer, soil):
     )
     assert np.any(renderer.render("main", soil) != before, axis=-1).sum() > 50
     soil.reset(None)
+
+
+@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+def test_the_load_is_seen_from_every_camera(machine, renderer, soil_with_parcels, heaped_load, camera):
+    machine.reset(CARRYING)
+    tool = machine.tool()
+    places_w = heaped_load @ tool.rotation_w.T + tool.position_w
+    empty = renderer.render(camera, soil_with_parcels())
+    loaded = renderer.render(camera, soil_with_parcels(places_w, is_load=[True] * len(places_w)))
+    assert np.any(loaded != empty, axis=-1).sum() >= 10
+
+
+@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+def test_soil_that_pours_into_the_box_is_seen_from_every_camera(
+    machine, renderer, soil_with_parcels, rng, camera
+):
+    machine.reset(DUMPING)
+    positions = TARGET_BOX.center_w + rng.uniform([-0.3, -0.3, 1.0], [0.3, 0.3, 2.0], (300, 3))
+    empty = renderer.render(camera, soil_with_parcels())
+    pouring = renderer.render(camera, soil_with_parcels(positions, is_load=[False] * len(positions)))
+    assert np.any(pouring != empty, axis=-1).sum() >= 10
+
+
+@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+def test_a_heap_in_the_box_is_seen_from_every_camera(machine, renderer, soil, rng, camera):
+    machine.reset(DUMPING)
+    soil.reset(None)
+    empty = renderer.render(camera, soil)
+    positions = TARGET_BOX.center_w + rng.uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 1.2], (500, 3))
+    soil.add_parcels(positions, np.zeros_like(positions))
+    for _ in range(200):
+        soil.step()
+    assert soil.box_mass_kg > 400.0
+    assert np.any(renderer.render(camera, soil) != empty, axis=-1).sum() >= 10
+    soil.reset(None)
+
+
+def test_the_view_without_machine_shows_no_loose_soil(machine, renderer, soil_with_parcels, rng):
+    before = renderer.terrain_points_w(soil_with_parcels())
+    positions = rng.uniform([-1, -1, 0.5], [1, 1, 1.5], (200, 3))
+    after = renderer.terrain_points_w(soil_with_parcels(positions, is_load=[False] * len(positions)))
+    np.testing.assert_array_equal(before, after)
 
 
 def test_appearance_changes_the_picture(machine, renderer, soil):
