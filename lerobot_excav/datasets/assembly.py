@@ -14,6 +14,7 @@ from lerobot_excav.datasets.schema import (
     PAIR_KEY,
     ROBOT_TYPE,
     SCENE_KEY,
+    SIMULATION_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
@@ -21,6 +22,7 @@ from lerobot_excav.datasets.schema import (
     camera_key,
     dataset_features,
 )
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 
 # Encoding a picture releases the interpreter lock; two threads hide most of it behind the rest (measured).
 IMAGE_THREADS = 2
@@ -54,6 +56,7 @@ def append_episode(dataset: LeRobotDataset, episode: Episode) -> None:
         TARGET_KEY: np.array([episode.pair.target_id], dtype=np.int64),
         PAIR_KEY: episode.pair.uid,
         SUCCESS_KEY: np.array([episode.success]),
+        SIMULATION_KEY: np.array([SIMULATION_VERSION], dtype=np.int64),
         "task": episode.task,
     }
     for frame in range(episode.length):

@@ -1,6 +1,7 @@
 """What determines a set of demonstrations: the same settings give the same dataset, whatever runs it."""
 
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.pair import Pair
@@ -13,6 +14,7 @@ from lerobot_excav.envs.settings import (
     require_image_size,
     require_task,
 )
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION, UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 ENVS = ("excavator",)
@@ -86,18 +88,30 @@ class DemonstrationSettings:
         """Return the fields by name."""
         return asdict(self)
 
+    def as_record(self) -> dict[str, Any]:
+        """Return the fields by name, and the version of the simulation that they are played in."""
+        return {"simulation_version": SIMULATION_VERSION, **self.as_dict()}
+
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "DemonstrationSettings":
-        """Rebuild settings from `as_dict`.
+    def from_record(cls, record: dict[str, Any], *, source: Path) -> "DemonstrationSettings":
+        """Rebuild settings from `as_record`.
+
+        Args:
+            record: What `as_record` returned.
+            source: Where it was stored, for messages.
 
         Raises:
-            ConfigurationError: A field is missing or unknown.
+            ConfigurationError: It belongs to another version of the simulation, or a field is missing or unknown.
         """
-        known = {field.name for field in fields(cls)}
-        if set(values) != known:
-            raise ConfigurationError(
-                f"the stored settings have other fields: {sorted(set(values) ^ known)}; they come from another version"
-            )
+        values = dict(record)
+        version = values.pop("simulation_version", UNMARKED_VERSION)
+        require(
+            version == SIMULATION_VERSION,
+            f"{source} is of version {version} of the simulation, and this is version {SIMULATION_VERSION}; "
+            "choose another --out, or install the release of lerobot_env_excav that began it",
+        )
+        unlike = sorted(set(values) ^ {field.name for field in fields(cls)})
+        require(not unlike, f"{source} has other settings ({', '.join(unlike)}); choose another --out")
         return cls(**values)
 
     def require_same(self, other: "DemonstrationSettings") -> None:

@@ -22,11 +22,13 @@ from lerobot_excav.datasets.schema import (
     ACTION_KEY,
     PAIR_KEY,
     SCENE_KEY,
+    SIMULATION_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
 )
+from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 CODEBASE_VERSION = "v3.0"
@@ -69,6 +71,11 @@ class EpisodeTable:
     def success(self) -> bool:
         """Outcome."""
         return bool(self._constant(SUCCESS_KEY))
+
+    @property
+    def simulation_version(self) -> int:
+        """Version of the simulation that the episode was recorded in."""
+        return int(self._constant(SIMULATION_KEY))
 
     @property
     def pair(self) -> Pair:
@@ -149,7 +156,7 @@ def iterate_episodes(
 
     Args:
         root: The dataset.
-        keys: Columns to read.
+        keys: Columns to read. A dataset without `excav.simulation_version` is of the version that did not write it.
         episodes: Episode indices; all by default.
 
     Yields:
@@ -165,13 +172,20 @@ def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iter
     columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
     for group in range(parquet.num_row_groups):
         # LeRobot writes one row group per episode; a file written by something else just costs more memory.
-        table = parquet.read_row_group(group, columns=columns)
+        table = _marked(parquet.read_row_group(group, columns=columns), columns)
         for index in pc.unique(table["episode_index"]).to_pylist():
             if index in wanted:
                 rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
                 yield EpisodeTable(
                     index=index, length=rows.num_rows, columns={key: rows[key] for key in keys}
                 )
+
+
+def _marked(table: pa.Table, columns: Sequence[str]) -> pa.Table:
+    """Add the version of the simulation to a table that was asked for it and lacks it."""
+    if SIMULATION_KEY not in columns or SIMULATION_KEY in table.column_names:
+        return table
+    return table.append_column(SIMULATION_KEY, pa.array([UNMARKED_VERSION] * table.num_rows, pa.int64()))
 
 
 def require_single_task(root: Path, episodes: Collection[int]) -> None:

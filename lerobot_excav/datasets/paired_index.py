@@ -19,6 +19,7 @@ from lerobot_excav.datasets.schema import (
     MASK_KEY,
     PAIR_KEY,
     SCENE_KEY,
+    SIMULATION_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
@@ -29,7 +30,17 @@ from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
 from lerobot_excav.errors import DatasetError
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
-INDEX_KEYS = (STATE_KEY, ACTION_KEY, MASK_KEY, SCENE_KEY, TARGET_KEY, PAIR_KEY, TASK_STATE_KEY, SUCCESS_KEY)
+INDEX_KEYS = (
+    STATE_KEY,
+    ACTION_KEY,
+    MASK_KEY,
+    SCENE_KEY,
+    TARGET_KEY,
+    PAIR_KEY,
+    TASK_STATE_KEY,
+    SUCCESS_KEY,
+    SIMULATION_KEY,
+)
 
 UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
 
@@ -77,6 +88,7 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
         "pair_uid": pair.uid,
         "episode_index": episode.index,
         **pair._asdict(),
+        "simulation_version": episode.simulation_version,
         "length": episode.length,
         "success": episode.success,
         **_mask_summary(episode.image(MASK_KEY, 0)),

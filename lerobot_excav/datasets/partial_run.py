@@ -72,10 +72,10 @@ class PartialRun:
     def _match_settings(self, settings: DemonstrationSettings) -> None:
         path = self.folder / "settings.json"
         try:
-            started = DemonstrationSettings.from_dict(json.loads(path.read_text()))
+            started = DemonstrationSettings.from_record(json.loads(path.read_text()), source=path)
         except (FileNotFoundError, json.JSONDecodeError):
             # Nothing was simulated before the settings were whole.
-            path.write_text(json.dumps(settings.as_dict(), indent=2))
+            path.write_text(json.dumps(settings.as_record(), indent=2))
         else:
             settings.require_same(started)
 

@@ -35,7 +35,7 @@ def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list
     record = {
         "package": f"lerobot_env_excav {version('lerobot_env_excav')}",
         "operator": "scripted",
-        "settings": settings.as_dict(),
+        "settings": settings.as_record(),
         "episodes": [
             {**outcome, "seed": settings.episode_seed(Pair.parse(outcome["pair_uid"]))}
             for outcome in outcomes
@@ -49,13 +49,16 @@ def read_provenance(root: Path) -> Provenance:
 
     Raises:
         DatasetError: The dataset does not say.
+        ConfigurationError: It was made in another version of the simulation.
     """
+    path = root / PROVENANCE_PATH
     try:
-        record = json.loads((root / PROVENANCE_PATH).read_text())
+        record = json.loads(path.read_text())
     except FileNotFoundError:
         raise DatasetError(
             f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"
         ) from None
     return Provenance(
-        settings=DemonstrationSettings.from_dict(record["settings"]), outcomes=record["episodes"]
+        settings=DemonstrationSettings.from_record(record["settings"], source=path),
+        outcomes=record["episodes"],
     )

@@ -14,6 +14,7 @@ from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, buil
 from lerobot_excav.datasets.replay_check import SoilChoice, replay_problem, soil_of
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import require_columns
+from lerobot_excav.datasets.version_check import require_this_simulation, versions_of
 from lerobot_excav.errors import require
 
 
@@ -42,7 +43,8 @@ def check_dataset(
         The checked rows of the index, with `qc` (`passed` or `failed`), `qc_problem` and `replayed`.
 
     Raises:
-        DatasetError: A column is missing or contradictory, or the soil is unknown.
+        DatasetError: A column is missing or contradictory, the soil of a replay is unknown, or it was recorded in
+            another version of the simulation.
         ConfigurationError: An episode that does not exist, or a negative number of replays.
     """
     info = read_info(root)
@@ -60,6 +62,10 @@ def check_dataset(
     sound = [number for number in wanted if not problems[number]]
     sample = np.random.default_rng(seed).permutation(sound)[:replays].tolist()
     if sample:
+        versions = versions_of(index)
+        require_this_simulation(
+            {i: versions[i] for i in wanted}, source=root, instead="; --replays=0 checks all but replays"
+        )
         rig = rig or ExcavatorRig(with_images=False)
         choice = SoilChoice(soil, fidelity) if soil and fidelity else _chosen(soil_of(root), soil, fidelity)
         for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
@@ -80,12 +86,13 @@ def _chosen(recorded: SoilChoice, soil: str | None, fidelity: str | None) -> Soi
 
 def _static_problems(root: Path, wanted: list[int]) -> dict[int, list[str]]:
     problems: dict[int, list[str]] = {}
-    scenes: dict[Pair, list[EpisodeTable]] = defaultdict(list)
+    scenes: dict[tuple[int, Pair], list[EpisodeTable]] = defaultdict(list)
     for episode in iterate_episodes(root, (*INDEX_KEYS, MAIN_KEY, "frame_index"), episodes=wanted):
         problems[episode.index] = episode_problems(episode)
         if not problems[episode.index]:
-            scenes[episode.pair._replace(target_id=0)].append(episode.first_frame())
-    for scene in scenes.values():
-        for number, problem in scene_problems(scene).items():
+            scene = (episode.simulation_version, episode.pair._replace(target_id=0))
+            scenes[scene].append(episode.first_frame())
+    for starts in scenes.values():
+        for number, problem in scene_problems(starts).items():
             problems[number].append(problem)
     return problems

@@ -25,6 +25,7 @@ from lerobot_excav.datasets.schema import (
     MASK_KEY,
     PAIR_KEY,
     SCENE_KEY,
+    SIMULATION_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
@@ -33,6 +34,8 @@ from lerobot_excav.datasets.schema import (
     require_columns,
 )
 from lerobot_excav.datasets.session import SESSION_PATH, SessionEpisode, read_session
+from lerobot_excav.datasets.version_check import require_this_simulation
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
 STATE_TOLERANCE = 1e-4
@@ -94,6 +97,8 @@ def _require_completable(root: Path, session: dict[int, SessionEpisode]) -> None
         raise DatasetError(
             f"the session has no line for episodes {missing}; is it the session of this recording?"
         )
+    versions = {index: session[index].simulation_version for index in range(info.total_episodes)}
+    require_this_simulation(versions, source=root, instead="")
     for index in range(info.total_episodes):
         episode = session[index]
         if episode.fps != info.fps:
@@ -173,6 +178,7 @@ def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> Non
         PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
         TASK_STATE_KEY: (task_state, excav_features()[TASK_STATE_KEY]),
         SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
+        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, SIMULATION_VERSION)),
     }
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)

@@ -22,6 +22,7 @@ TARGET_KEY = "excav.target_id"
 PAIR_KEY = "excav.pair_uid"
 TASK_STATE_KEY = "excav.task_state"
 SUCCESS_KEY = "excav.success"
+SIMULATION_KEY = "excav.simulation_version"
 
 Feature = dict[str, Any]
 
@@ -43,6 +44,7 @@ def excav_features() -> dict[str, Feature]:
             "names": list(TASK_STATE_NAMES),
         },
         SUCCESS_KEY: {"dtype": "bool", "shape": (1,), "names": None},
+        SIMULATION_KEY: {"dtype": "int64", "shape": (1,), "names": None},
     }
 
 
@@ -74,6 +76,8 @@ def dataset_features(*, height: int, width: int) -> dict[str, Feature]:
 def require_columns(features: dict[str, Feature]) -> None:
     """Check that a dataset has the columns of this schema with the right types.
 
+    `excav.simulation_version` may be missing: datasets of the first version have no such column.
+
     Args:
         features: Feature descriptions of the dataset.
 
@@ -81,12 +85,12 @@ def require_columns(features: dict[str, Feature]) -> None:
         DatasetError: A column is missing or is of another type.
     """
     expected = dataset_features(height=0, width=0)
-    missing = [key for key in expected if key not in features]
+    missing = [key for key in expected if key not in features and key != SIMULATION_KEY]
     if missing:
         hint = "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`"
         raise DatasetError(f"the dataset lacks {', '.join(missing)}; {hint}")
-    for key, feature in expected.items():
-        problem = _difference(features[key], feature)
+    for key in expected.keys() & features.keys():
+        problem = _difference(features[key], expected[key])
         if problem:
             raise DatasetError(f"{key}: {problem}")
 

@@ -3,14 +3,13 @@
 The file is JSON Lines, one object per episode; `robots.excavator_sim.session_log` writes it.
 """
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.pair import Pair
+from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 SESSION_PATH = Path("meta/excav_session.jsonl")
@@ -23,6 +22,7 @@ class SessionEpisode:
     """One recorded episode.
 
     Attributes:
+        simulation_version: Version of the simulation.
         episode_index: Its number when it was recorded.
         scene_set: Scene set.
         scene_id: Scene.
@@ -37,6 +37,7 @@ class SessionEpisode:
         restarts: Frames after which the scene was restarted within the episode.
     """
 
+    simulation_version: int
     episode_index: int
     scene_set: str
     scene_id: int
@@ -82,25 +83,20 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
     Raises:
         DatasetError: The file is missing, or a line is not what it should be.
     """
-    try:
-        lines = path.read_text().splitlines()
-    except FileNotFoundError:
-        raise DatasetError(
-            f"--session={path} does not exist; the robot wrote it to --robot.session_log"
-        ) from None
-    episodes = [_episode(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
+    lines = read_json_lines(path, origin="the robot wrote its session to --robot.session_log")
+    episodes = [_episode(line) for line in lines]
     return {episode.episode_index: episode for episode in episodes}
 
 
-def _episode(line: str, place: str) -> SessionEpisode:
-    try:
-        record: Mapping[str, Any] = json.loads(line)
-    except json.JSONDecodeError as error:
-        raise DatasetError(f"{place}: not JSON ({error}); the file is damaged") from error
+def _episode(line: Line) -> SessionEpisode:
+    # The first version wrote neither its number nor the fidelity, of which it had one only.
+    record = {"simulation_version": UNMARKED_VERSION, **line.record}
+    if record["simulation_version"] == UNMARKED_VERSION:
+        record.setdefault("fidelity", "standard")
     values = {field.name: record[field.name] for field in fields(SessionEpisode) if field.name in record}
     missing = {field.name for field in fields(SessionEpisode)} - {"frames", "restarts"} - set(values)
     if missing:
         raise DatasetError(
-            f"{place}: lacks {', '.join(sorted(missing))}; is it a session log of excavator_sim?"
+            f"{line.place}: lacks {', '.join(sorted(missing))}; is it a session log of excavator_sim?"
         )
     return SessionEpisode(**{**values, "restarts": tuple(values.get("restarts", ()))})

@@ -127,14 +127,6 @@ class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes 
         log = None
         if self.metrics_path is not None:
             log = MetricsLog(self.metrics_path, n_envs=n_envs, max_episodes=self.metrics_episodes)
-            log.common = {
-                "task": self.task,
-                "scene_set": self.scene_set,
-                "mask_condition": self.mask_condition,
-                "soil": self.soil,
-                "fidelity": self.fidelity,
-                "fps": self.fps,
-            }
         vector = make_vector_env(self._make_one, n_envs, use_async=use_async_envs, metrics_log=log)
         return {self.type: {0: vector}}
 

@@ -3,11 +3,11 @@
 LeRobot keeps rewards and success only. This file keeps the rest, written by the main process, in the order
 in which LeRobot counts: line `i` of an evaluation is `per_episode[i]` of its `eval_info.json`.
 
-    {"episode_ix": 0, "seed": 1000, "task": "Scoop-v0", "scene_set": "test", "mask_condition": "correct",
-     "soil": "sand", "fidelity": "standard", "fps": 10, "scene_id": 1000, "target_id": 0, "success": true, ...}
+    {"episode_ix": 0, "seed": 1000, "simulation_version": 2, "task": "Scoop-v0", "scene_set": "test",
+     "scene_id": 1000, "target_id": 0, "mask_condition": "correct", "soil": "sand", "is_success": true, ...}
 
-followed by every entry of the environment's `episode_metrics`. A number that does not exist, such as the
-distance at a loading that never began, is `null`.
+All but the first two entries are the environment's `episode_metrics`. A number that does not exist, such as
+the time of a loading that never began, is `null`.
 
 LeRobot runs whole batches: with `--eval.n_episodes=5 --eval.batch_size=3` it runs six episodes and drops
 the last. `episode_ix` tells them apart, and `max_episodes` leaves them out. Every evaluation of a training
@@ -34,16 +34,12 @@ class MetricsLog:
         n_envs: Environments in a batch.
         max_episodes: Episodes of the evaluation to write; None writes all.
 
-    Attributes:
-        common: Entries that every line shares.
-
     Raises:
         ConfigurationError: The file cannot be written.
     """
 
     def __init__(self, path: Path, *, n_envs: int, max_episodes: int | None = None) -> None:
         self.path = Path(path)
-        self.common: dict[str, Any] = {}
         self._max_episodes = max_episodes
         self._n_envs = n_envs
         self._batch = -1
@@ -75,7 +71,7 @@ class MetricsLog:
 
         Args:
             env_index: Position of the environment in the batch.
-            info: Information of the last step: `is_success`, `scene_id`, `target_id`, `episode_metrics`.
+            info: Information of the last step, with `episode_metrics`.
 
         Raises:
             ConfigurationError: The environment did not end the episode itself, so there are no metrics.
@@ -95,10 +91,6 @@ class MetricsLog:
         line = {
             "episode_ix": self._batch * self._n_envs + env_index,
             "seed": self._seeds[env_index],
-            **self.common,
-            "scene_id": info["scene_id"],
-            "target_id": info["target_id"],
-            "success": info["is_success"],
             **info["episode_metrics"],
         }
         return {key: _plain(value) for key, value in line.items()}

@@ -39,7 +39,7 @@ def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Differenc
         rng: Source of the bootstrap.
 
     Raises:
-        DatasetError: The runs show different scenes or targets.
+        DatasetError: The runs show different scenes or targets, or dug different soils.
     """
     require_same_keys(first, second)
     return [_difference(measure, first, second, rng) for measure in MEASURES]
@@ -47,6 +47,7 @@ def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Differenc
 
 def require_same_keys(first: Run, second: Run) -> None:
     """Raise `DatasetError` unless two runs show the same scenes and targets."""
+    _require_same_world(first, second)
     missing = set(first.keys) ^ set(second.keys)
     if missing:
         examples = ", ".join(str(key) for key in sorted(missing)[:3])
@@ -54,6 +55,23 @@ def require_same_keys(first: Run, second: Run) -> None:
             f"{first.label} and {second.label} differ in {len(missing)} scenes and targets ({examples}, …), so they "
             "cannot be compared pairwise; evaluate both with the same --seed and --eval.n_episodes"
         )
+
+
+def difference_of_worlds(first: Run, second: Run) -> str:
+    """Say why the scenes of two runs differ although their numbers are the same; an empty string if they do not."""
+    if (first.soil, first.simulation_version) == (second.soil, second.simulation_version):
+        return ""
+    played = " and ".join(
+        f"{run.label} dug {run.soil} in version {run.simulation_version} of the simulation"
+        for run in (first, second)
+    )
+    return f"{played}, where a number means another scene"
+
+
+def _require_same_world(first: Run, second: Run) -> None:
+    difference = difference_of_worlds(first, second)
+    if difference:
+        raise DatasetError(f"{difference}; play both alike, or report them apart")
 
 
 def means_by_key(run: Run, measure: str) -> NDArray[Any]:
@@ -82,6 +100,7 @@ def matched(run: Run, reference: Run) -> NDArray[Any]:
     Raises:
         DatasetError: The reference lacks one of them.
     """
+    _require_same_world(run, reference)
     missing = set(run.keys) - set(reference.keys)
     if missing:
         examples = ", ".join(str(key) for key in sorted(missing)[:3])

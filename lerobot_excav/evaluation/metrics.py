@@ -1,11 +1,12 @@
 """What was measured in an evaluation: one line of JSON per episode, as `--env.metrics_path` writes it."""
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lerobot_excav.datasets.json_lines import Line, read_json_lines
+from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError, require
 
 TASK = "Scoop-v0"
@@ -27,6 +28,7 @@ class EpisodeMetrics:
     """Outcome of one episode; see `docs/datasets.md` for the definitions.
 
     Attributes:
+        simulation_version: Version of the simulation.
         scene_set: Scene set.
         scene_id: Scene.
         target_id: Target.
@@ -41,6 +43,7 @@ class EpisodeMetrics:
         spill_before_target_events: Losses of soil on the way.
     """
 
+    simulation_version: int
     scene_set: str
     scene_id: int
     target_id: int
@@ -88,61 +91,49 @@ def read_evaluation(path: Path) -> Evaluation:
             occurs twice.
     """
     path = path / "metrics.jsonl" if path.is_dir() else path
-    try:
-        lines = path.read_text().splitlines()
-    except FileNotFoundError:
-        raise DatasetError(
-            f"{path} does not exist; lerobot-eval writes it with --env.metrics_path={path}"
-        ) from None
-    records = [_parse(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
-    if not records:
+    lines = read_json_lines(path, origin=f"lerobot-eval writes it with --env.metrics_path={path}")
+    if not lines:
         raise DatasetError(f"{path} is empty: no episode was finished")
-    evaluations = _evaluations(records)
+    evaluations = _evaluations(lines)
     last = evaluations[-1]
     return Evaluation(
         path=path,
         of=len(evaluations),
-        operator=last[0][1].get("operator"),
+        operator=last[0].record.get("operator"),
         episodes=_by_key(last),
     )
 
 
-def _parse(line: str, place: str) -> tuple[str, dict[str, Any]]:
-    try:
-        record = json.loads(line)
-    except json.JSONDecodeError as error:
-        raise DatasetError(f"{place}: not JSON ({error}); was the evaluation interrupted?") from error
-    if not isinstance(record, dict):
-        raise DatasetError(f"{place}: a JSON object is expected, not {line[:40]!r}")
-    return place, record
-
-
-def _evaluations(records: list[tuple[str, dict[str, Any]]]) -> list[list[tuple[str, dict[str, Any]]]]:
+def _evaluations(lines: list[Line]) -> list[list[Line]]:
     """Cut a file where LeRobot began to count anew."""
-    starts = [i for i, (_, record) in enumerate(records) if i == 0 or record.get("episode_ix") == 0]
-    return [records[a:b] for a, b in zip(starts, [*starts[1:], len(records)], strict=True)]
+    starts = [i for i, line in enumerate(lines) if i == 0 or line.record.get("episode_ix") == 0]
+    return [lines[a:b] for a, b in zip(starts, [*starts[1:], len(lines)], strict=True)]
 
 
-def _by_key(records: Iterable[tuple[str, dict[str, Any]]]) -> dict[EpisodeKey, EpisodeMetrics]:
+def _by_key(lines: Iterable[Line]) -> dict[EpisodeKey, EpisodeMetrics]:
     episodes: dict[EpisodeKey, EpisodeMetrics] = {}
-    for place, record in records:
-        episode = _episode(record, place)
+    for line in lines:
+        episode = _episode(line)
         if episode.key in episodes:
             raise DatasetError(
-                f"{place}: scene and target {episode.key} occur twice; are these two evaluations?"
+                f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?"
             )
         episodes[episode.key] = episode
     return episodes
 
 
-def _episode(record: Mapping[str, Any], place: str) -> EpisodeMetrics:
+def _episode(line: Line) -> EpisodeMetrics:
+    # The first version wrote neither its number nor the fidelity, of which it had one only.
+    record = {"simulation_version": UNMARKED_VERSION, **line.record}
+    if record["simulation_version"] == UNMARKED_VERSION:
+        record.setdefault("fidelity", "standard")
     if record.get("task", TASK) != TASK:
-        raise DatasetError(f"{place}: task={record['task']!r}; reports are made of {TASK} only")
+        raise DatasetError(f"{line.place}: task={record['task']!r}; reports are made of {TASK} only")
     values: dict[str, Any] = {}
     for field in fields(EpisodeMetrics):
         if field.name not in record:
-            raise DatasetError(f"{place}: lacks {field.name}; was it written by --env.metrics_path?")
-        values[field.name] = _typed(record[field.name], field.type, f"{place}: {field.name}")
+            raise DatasetError(f"{line.place}: lacks {field.name}; was it written by --env.metrics_path?")
+        values[field.name] = _typed(record[field.name], field.type, f"{line.place}: {field.name}")
     return EpisodeMetrics(**values)
 
 
@@ -179,12 +170,22 @@ class Run:
                 f"{self.label}: {evaluation.path} shows other scenes or targets than {self.evaluations[0].path}; "
                 "evaluate every seed with the same --seed and --eval.n_episodes",
             )
-        conditions = {(e.mask_condition, e.soil, e.fidelity) for e in self.episodes}
+        conditions = {(e.mask_condition, e.soil, e.fidelity, e.simulation_version) for e in self.episodes}
         require(
             len(conditions) == 1,
-            f"{self.label} mixes mask conditions, soils or fidelities: {sorted(conditions)}; "
-            "give each a file of its own",
+            f"{self.label} mixes mask conditions, soils, fidelities or versions of the simulation: "
+            f"{sorted(conditions)}; give each a file of its own",
         )
+
+    @property
+    def simulation_version(self) -> int:
+        """Version of the simulation, the same for all episodes."""
+        return self.episodes[0].simulation_version
+
+    @property
+    def soil(self) -> str:
+        """Soil preset, the same for all episodes."""
+        return self.episodes[0].soil
 
     @property
     def keys(self) -> list[EpisodeKey]:

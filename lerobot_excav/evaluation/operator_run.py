@@ -10,6 +10,7 @@ from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
@@ -91,16 +92,23 @@ def _play_rest(
 def play_for_metrics(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
     """Play one episode and return its line of the metrics file; runs in a worker."""
     episode = play_demonstration(rig, settings, pair)
-    return {**_common(settings), "success": episode.success, **episode.metrics}
+    return {**_operator(settings), **episode.metrics}
 
 
-def _common(settings: DemonstrationSettings) -> dict[str, Any]:
-    """Return what all lines share."""
+def _operator(settings: DemonstrationSettings) -> dict[str, Any]:
+    """Return what the environment does not know: who plays."""
+    return {"operator": "scripted", "operator_seed": settings.seed}
+
+
+def _expected(settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
+    """Return the part of an episode's line that is known before it is played."""
     return {
-        "operator": "scripted",
-        "operator_seed": settings.seed,
+        **_operator(settings),
+        "simulation_version": SIMULATION_VERSION,
         "task": settings.task,
-        "scene_set": settings.scene_set,
+        "scene_set": pair.scene_set,
+        "scene_id": pair.scene_id,
+        "target_id": pair.target_id,
         "soil": settings.soil,
         "fidelity": settings.fidelity,
         "fps": settings.fps,
@@ -115,11 +123,10 @@ def _finished_lines(partial: Path, settings: DemonstrationSettings, pairs: list[
     lines = [line for line in partial.read_text().splitlines(keepends=True) if line.endswith("\n")]
     for line, pair in zip(lines, pairs, strict=False):
         record = json.loads(line)
-        wanted = {**_common(settings), "scene_id": pair.scene_id, "target_id": pair.target_id}
-        for name, value in wanted.items():
-            if record[name] != value:
+        for name, value in _expected(settings, pair).items():
+            if record.get(name) != value:
                 raise ConfigurationError(
-                    f"{partial} was started with {name}={record[name]!r}, not {value!r}; "
+                    f"{partial} was started with {name}={record.get(name)!r}, not {value!r}; "
                     "continue it with the same options, or remove the file"
                 )
     return [line.rstrip("\n") for line in lines[: len(pairs)]]

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.evaluation.comparison import Difference, compare, matched, means_by_key
+from lerobot_excav.evaluation.comparison import (
+    Difference,
+    compare,
+    difference_of_worlds,
+    matched,
+    means_by_key,
+)
 from lerobot_excav.evaluation.metrics import Run
 from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
 
@@ -22,6 +28,7 @@ class RunSummary:
         seeds: Number of evaluations, one per training seed.
         scenes: Number of scenes and targets.
         mask_condition: Which mask was shown.
+        simulation_version: Version of the simulation.
         soil: Soil preset.
         fidelity: Numerical effort of the soil.
         target_success: Rate, Wilson interval over episodes.
@@ -38,6 +45,7 @@ class RunSummary:
     seeds: int
     scenes: int
     mask_condition: str
+    simulation_version: int
     soil: str
     fidelity: str
     target_success: Interval
@@ -73,7 +81,7 @@ class Report:
 
 
 def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) -> Report:
-    """Summarise runs and compare each with the first.
+    """Summarise runs and compare each with the first; a run on another soil has other scenes and is not compared.
 
     Args:
         runs: At least one run.
@@ -81,16 +89,24 @@ def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) 
         seed: Seed of the bootstrap.
 
     Raises:
-        DatasetError: Runs show different scenes or targets.
+        DatasetError: Runs of one soil show different scenes or targets, or the operator dug another soil than a run.
     """
     rng = np.random.default_rng(seed)
     rows = [*runs, *([operator] if operator else [])]
+    unlike = {run.label: difference_of_worlds(runs[0], run) for run in runs[1:]}
     return Report(
         runs=[_summarise(run, operator, rng) for run in rows],
-        differences={f"{run.label} - {runs[0].label}": compare(runs[0], run, rng) for run in runs[1:]},
+        differences={
+            f"{run.label} - {runs[0].label}": compare(runs[0], run, rng)
+            for run in runs[1:]
+            if not unlike[run.label]
+        },
         operator=_who(operator) if operator else None,
         bootstrap_seed=seed,
-        notes=[note for run in rows for note in _notes(run)],
+        notes=[
+            *(note for run in rows for note in _notes(run)),
+            *(f"no paired differences to {label}: {reason}" for label, reason in unlike.items() if reason),
+        ],
     )
 
 
@@ -107,7 +123,8 @@ def _summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunS
         seeds=len(run.evaluations),
         scenes=len(run.keys),
         mask_condition=episodes[0].mask_condition,
-        soil=episodes[0].soil,
+        simulation_version=run.simulation_version,
+        soil=run.soil,
         fidelity=episodes[0].fidelity,
         target_success=rate([episode.target_success for episode in episodes]),
         full_success=rate([episode.is_success for episode in episodes]),

@@ -8,6 +8,7 @@ from lerobot_excav.evaluation.statistics import Interval
 
 HEADER = (
     "run",
+    "soil",
     "mask",
     "n",
     "seeds",
@@ -44,6 +45,7 @@ def _legend(report: Report) -> list[str]:
         "Brackets: 95 % intervals; Wilson's for rates over episodes, bootstrap for means over scenes and targets "
         f"(seed {report.bootstrap_seed}).",
         "n: episodes over all training seeds.",
+        f"Simulation: {_simulations(report)}.",
     ]
     if report.operator is None:
         lines.append("Efficiency needs an operator's run on the same scenes: --operator=FILE.")
@@ -59,9 +61,21 @@ def _legend(report: Report) -> list[str]:
     return [*lines, *report.notes]
 
 
+def _simulations(report: Report) -> str:
+    """Name version of the simulation and fidelity of the soil, run by run if they differ."""
+    by_run = {
+        run.label: f"version {run.simulation_version}, {run.fidelity} fidelity of the soil"
+        for run in report.runs
+    }
+    if len(set(by_run.values())) == 1:
+        return next(iter(by_run.values()))
+    return "; ".join(f"{label}: {text}" for label, text in by_run.items())
+
+
 def _row(run: RunSummary) -> list[str]:
     return [
         run.label,
+        run.soil,
         run.mask_condition,
         str(run.episodes),
         str(run.seeds),

@@ -23,6 +23,7 @@ import pandas as pd
 from lerobot_excav.datasets.pair_coverage import PairCoverage, pair_coverage
 from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.split import SPLIT_UNITS, Split, split
+from lerobot_excav.datasets.version_check import episodes_by_version, require_one_version, versions_of
 from lerobot_excav.errors import require
 
 DEFAULT_EVAL_FRACTION = 0.2
@@ -90,18 +91,24 @@ def _asks_for_episodes(arguments: argparse.Namespace) -> bool:
 
 def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     """Describe an index in a few lines."""
+    versions = episodes_by_version(versions_of(index))
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
     lines = [
+        "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in sorted(versions.items())),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
         f"retained mass: {index['retained_mass_kg'].mean():.0f} kg on average",
     ]
+    if len(versions) > 1:
+        lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")
+        return lines
     lines += [f"missing: {scene} lacks target {targets}" for scene, targets in coverage.missing.items()]
     lines += [f"duplicate: {uid} in episodes {episodes}" for uid, episodes in coverage.duplicates.items()]
     return lines
 
 
 def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame) -> None:
+    require_one_version(versions_of(index), source=root)
     seed = arguments.seed or 0
     rows = usable(index, include_failures=arguments.include_failures)
     rows = select(rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=seed)

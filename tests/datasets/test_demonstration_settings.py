@@ -1,4 +1,5 @@
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -26,12 +27,28 @@ def test_one_target_per_scene_goes_round_the_targets():
 
 def test_settings_read_back():
     settings = DemonstrationSettings(soil="gravel", scenes=7)
-    assert DemonstrationSettings.from_dict(settings.as_dict()) == settings
+    assert DemonstrationSettings.from_record(settings.as_record(), source=Path("s.json")) == settings
 
 
-def test_settings_of_another_version_are_refused():
-    with pytest.raises(ConfigurationError, match="colour"):
-        DemonstrationSettings.from_dict({**DemonstrationSettings().as_dict(), "colour": 1})
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"colour": 1}, r"s\.json has other settings \(colour\)"),
+        ({"simulation_version": 99}, r"s\.json is of version 99 of the simulation"),
+    ],
+)
+def test_stored_settings_of_another_version_are_refused(changes, message):
+    with pytest.raises(ConfigurationError, match=message):
+        DemonstrationSettings.from_record(
+            {**DemonstrationSettings().as_record(), **changes}, source=Path("s.json")
+        )
+
+
+def test_stored_settings_without_a_version_are_of_the_first():
+    record = DemonstrationSettings().as_record()
+    del record["simulation_version"]
+    with pytest.raises(ConfigurationError, match="is of version 1 of the simulation, and this is version"):
+        DemonstrationSettings.from_record(record, source=Path("s.json"))
 
 
 @pytest.mark.parametrize(

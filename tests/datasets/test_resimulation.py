@@ -10,6 +10,7 @@ from lerobot_excav.datasets import resimulation
 from lerobot_excav.datasets.paired_index import INDEX_PATH, read_index, write_index
 from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
 
@@ -31,6 +32,7 @@ def recording(paired_dataset, tmp_path_factory):
             "fps": 10,
             "soil": "sand",
             "fidelity": "standard",
+            "simulation_version": SIMULATION_VERSION,
             "observation_height": 32,
             "observation_width": 48,
             "task": "Scoop-v0",
@@ -124,6 +126,7 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
         ({1: {"frames": 5}}, r"episode 1 has 6 frames, but the session noted 5 .* edited after recording"),
         ({1: {"target_id": 2}}, r"episode 1 does not show the target mask of excavator/train/0/2"),
         ({1: {"observation_height": 64}}, r"episode 1 does not show the target mask"),
+        ({1: {"simulation_version": 1}}, r"episodes 1 of version 1 of the simulation cannot be replayed"),
         ({1: {"restarts": [3]}}, r"episode 1 was restarted at frame \[3\]"),
         ({1: {"episode_index": 99}}, r"no line for episodes \[1\]"),
     ],
@@ -182,9 +185,7 @@ def test_a_dataset_with_the_columns_is_not_completed_again(paired_dataset, sessi
     assert (paired_dataset / INDEX_PATH).is_file()
 
 
-@pytest.mark.parametrize(
-    ("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks fidelity, fps")]
-)
+@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks fps")])
 def test_a_damaged_session_names_the_line(recording, toy_rig, tmp_path, text, message):
     folder, _ = recording
     (tmp_path / "s.jsonl").write_text(text)

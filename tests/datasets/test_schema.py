@@ -48,6 +48,12 @@ def test_columns_of_the_schema_are_accepted():
     require_columns(dataset_features(height=96, width=128))
 
 
+def test_the_version_of_the_simulation_may_be_missing_as_in_first_datasets():
+    features = dataset_features(height=96, width=128)
+    del features["excav.simulation_version"]
+    require_columns(features)
+
+
 def test_a_recording_without_excav_columns_is_refused_with_the_next_step():
     with pytest.raises(DatasetError, match=r"lacks excav.scene_id.*index DATASET --session"):
         require_columns(recorder_features(use_videos=False))

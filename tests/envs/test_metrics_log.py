@@ -11,8 +11,8 @@ from lerobot_excav.envs.metrics_log import MetricsLog
 from lerobot_excav.errors import ConfigurationError
 
 
-def final_info(*, scene_id: int = 0, **metrics: Any) -> dict[str, Any]:
-    return {"is_success": np.all([]), "scene_id": scene_id, "target_id": 1, "episode_metrics": metrics}
+def final_info(**metrics: Any) -> dict[str, Any]:
+    return {"is_success": np.all([]), "scene_id": 0, "target_id": 1, "episode_metrics": metrics}
 
 
 def lines_of(path: Path) -> list[dict[str, Any]]:
@@ -38,6 +38,13 @@ def test_lines_follow_the_seeds_not_the_finish(log: MetricsLog) -> None:
         (2, 9),
         (3, 10),
     ]
+
+
+def test_a_line_is_place_and_seed_and_what_the_environment_says(log: MetricsLog) -> None:
+    log.begin_batch([7, 8])
+    for i in range(2):
+        log.finish_episode(i, final_info(is_success=False, mass_kg=1.0))
+    assert lines_of(log.path)[1] == {"episode_ix": 1, "seed": 8, "is_success": False, "mass_kg": 1.0}
 
 
 def test_an_episode_is_scored_once(log: MetricsLog) -> None:
@@ -77,7 +84,6 @@ def test_numpy_values_become_plain_and_missing_numbers_null(log: MetricsLog) -> 
         log.finish_episode(i, final_info(**values))
     line = lines_of(log.path)[0]
     assert line["seed"] is None
-    assert line["success"] is True
     assert (line["mass_kg"], line["contacts"], line["distance_m"], line["phase"]) == (0.5, 2, None, "dump")
 
 

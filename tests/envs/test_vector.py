@@ -19,6 +19,7 @@ from lerobot.scripts.lerobot_eval import eval_policy
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.metrics_log import MetricsLog
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.vector import info_of_env, make_vector_env
 from lerobot_excav.errors import ConfigurationError
 
@@ -51,8 +52,12 @@ def countdown_maker() -> Callable[[], gym.Env[Any, Any]]:
             done = self.left == 0
             info: dict[str, Any] = {"is_success": done and self.seed_given % 2 == 1}
             if done:
-                metrics = {"command": float(action[0]), "note": f"seed {self.seed_given}"}
-                info |= {"scene_id": self.seed_given, "target_id": 0, "episode_metrics": metrics}
+                info["episode_metrics"] = {
+                    "scene_id": self.seed_given,
+                    "is_success": info["is_success"],
+                    "command": float(action[0]),
+                    "note": f"seed {self.seed_given}",
+                }
             return self.observe(), 1.0 + action[0], done, False, info
 
     return Countdown
@@ -124,7 +129,7 @@ def test_one_environment_counts_the_truth(run: Callable[..., Any]) -> None:
         seed = 100 + i
         steps = episode_length(seed)
         assert episode["seed"] == line["seed"] == line["scene_id"] == seed
-        assert episode["success"] == line["success"] == (seed % 2 == 1)
+        assert episode["success"] == line["is_success"] == (seed % 2 == 1)
         assert episode["sum_reward"] == pytest.approx(steps + 0.1 * sum(range(1, steps + 1)))
         assert line["note"] == f"seed {seed}"
 
@@ -147,7 +152,16 @@ def test_the_excavator_gives_the_same_alone_and_beside_others(tmp_path: Path) ->
     assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
         (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
     ]
-    assert {"task", "scene_set", "mask_condition", "success", "retained_mass_kg", "frames"} <= set(lines[0])
+    settings = {
+        "task": "Scoop-v0",
+        "scene_set": "test",
+        "mask_condition": "correct",
+        "soil": "sand",
+        "fps": 10,
+    }
+    settings |= {"fidelity": "standard", "episode_length": 4, "simulation_version": SIMULATION_VERSION}
+    assert lines[0].items() >= settings.items()
+    assert {"is_success", "retained_mass_kg", "frames"} <= set(lines[0])
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ def line(number, **changes):
     return {
         "episode_ix": number,
         "seed": number,
+        "simulation_version": 2,
         "task": "Scoop-v0",
         "scene_set": "test",
         "scene_id": number,

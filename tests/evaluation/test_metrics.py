@@ -17,13 +17,8 @@ def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, metrics_line):
 def test_what_the_environment_logs_is_read(tmp_path, metrics_line):
     log = MetricsLog(tmp_path / "m.jsonl", n_envs=1)
     log.begin_batch([1000])
-    log.common.update(fps=10)
-    metrics = {
-        k: v
-        for k, v in metrics_line(1000).items()
-        if k not in ("episode_ix", "seed", "scene_id", "target_id")
-    }
-    log.finish_episode(0, {"is_success": True, "scene_id": 1000, "target_id": 0, "episode_metrics": metrics})
+    metrics = {k: v for k, v in metrics_line(1000).items() if k not in ("episode_ix", "seed")}
+    log.finish_episode(0, {"episode_metrics": metrics})
     assert list(read_evaluation(tmp_path / "m.jsonl").episodes) == [EpisodeKey("test", 1000, 0)]
 
 
@@ -63,6 +58,13 @@ def test_a_missing_field_is_named(metrics_file, metrics_line):
         read_evaluation(metrics_file("m.jsonl", [incomplete]))
 
 
+def test_a_file_of_the_first_version_is_read(metrics_file, metrics_line):
+    first = metrics_line(3)
+    del first["simulation_version"], first["fidelity"]
+    (episode,) = read_evaluation(metrics_file("m.jsonl", [first])).episodes.values()
+    assert (episode.simulation_version, episode.fidelity) == (1, "standard")
+
+
 @pytest.mark.parametrize(("text", "message"), [("", "empty"), ("{", "not JSON"), ("3", "a JSON object")])
 def test_a_damaged_file_is_refused(tmp_path, text, message):
     (tmp_path / "m.jsonl").write_text(text)
@@ -80,6 +82,10 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, metrics_line):
         make_run("a", [metrics_line(1)], [metrics_line(2)])
 
 
-def test_a_run_does_not_mix_mask_conditions(make_run, metrics_line):
-    with pytest.raises(ConfigurationError, match="mixes mask conditions"):
-        make_run("a", [metrics_line(1), metrics_line(2, mask_condition="zero")])
+@pytest.mark.parametrize(
+    "changes",
+    [{"mask_condition": "zero"}, {"soil": "gravel"}, {"fidelity": "fine"}, {"simulation_version": 1}],
+)
+def test_a_run_does_not_mix_conditions(make_run, metrics_line, changes):
+    with pytest.raises(ConfigurationError, match="mixes mask conditions, soils"):
+        make_run("a", [metrics_line(1), metrics_line(2, **changes)])

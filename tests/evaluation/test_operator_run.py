@@ -5,7 +5,9 @@ import pytest
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.rig import ExcavatorRig
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.evaluation import operator_run
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.operator_run import evaluate_operator
 
@@ -23,6 +25,10 @@ class StillEnv:
 
     def step(self, action):
         metrics = {
+            "simulation_version": SIMULATION_VERSION,
+            "task": "Scoop-v0",
+            "fps": 10,
+            "episode_length": 200,
             "scene_set": "test",
             **self.options,
             "mask_condition": "correct",
@@ -104,6 +110,14 @@ def test_an_interrupted_run_continues_to_the_same_file(tmp_path):
     evaluate(tmp_path / "o.jsonl", resume=True)
     assert (tmp_path / "o.jsonl").read_text() == whole
     assert not (tmp_path / "o.jsonl.partial").exists()
+
+
+def test_a_run_of_another_version_of_the_simulation_is_not_continued(tmp_path, monkeypatch):
+    evaluate(tmp_path / "o.jsonl")
+    (tmp_path / "o.jsonl").rename(tmp_path / "o.jsonl.partial")
+    monkeypatch.setattr(operator_run, "SIMULATION_VERSION", 99)
+    with pytest.raises(ConfigurationError, match=f"simulation_version={SIMULATION_VERSION}, not 99"):
+        evaluate(tmp_path / "o.jsonl", resume=True)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@ import json
 
 import pytest
 
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.report import make_report, write_report
 from lerobot_excav.evaluation.report_text import report_text
 
@@ -64,3 +65,29 @@ def test_the_report_is_written_as_markdown_and_json(runs, tmp_path):
     written = json.loads((tmp_path / "new" / "folder" / "report.json").read_text())
     assert written["runs"][0]["target_success"]["estimate"] == 0.5
     assert (tmp_path / "new" / "folder" / "report.md").read_text() == report_text(report)
+
+
+@pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
+def test_runs_whose_scenes_differ_stand_side_by_side_and_are_not_paired(
+    runs, make_run, metrics_line, changes
+):
+    other = make_run("other", [metrics_line(i, **changes) for i in range(10)])
+    report = make_report([runs[0], other])
+    assert report.differences == {}
+    assert "no paired differences to other: half dug sand in version 2" in report_text(report)
+
+
+@pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
+def test_an_operator_of_other_scenes_is_refused(runs, make_run, metrics_line, changes):
+    operator = make_run("operator", [metrics_line(i, **changes) for i in range(12)])
+    with pytest.raises(DatasetError, match=r"half dug sand in version 2 .* and operator dug"):
+        make_report(runs[:1], operator=operator)
+
+
+def test_the_text_names_soil_fidelity_and_version(make_run, metrics_line):
+    runs = [make_run(soil, [metrics_line(0, soil=soil)]) for soil in ("sand", "gravel")]
+    text = report_text(make_report(runs))
+    assert "| gravel | gravel | correct" in text
+    assert "- Simulation: version 2, standard fidelity of the soil." in text
+    runs.append(make_run("fine", [metrics_line(0, fidelity="fine")]))
+    assert "fine: version 2, fine fidelity of the soil" in report_text(make_report(runs))

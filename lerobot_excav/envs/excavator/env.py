@@ -28,6 +28,7 @@ from lerobot_excav.envs.settings import (
     require_integer,
     require_task,
 )
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, require_choice
 
 RESET_OPTIONS = ("scene_id", "target_id")
@@ -275,12 +276,16 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
 
     def _episode_metrics(self) -> dict[str, Any]:
         return {
+            "simulation_version": SIMULATION_VERSION,
+            "task": self.task,
             "scene_set": self.scene_set,
             "scene_id": self.scene.scene_id,
             "target_id": self.target_id,
             "mask_condition": self.mask_condition,
             "soil": self.soil_name,
             "fidelity": self.fidelity,
+            "fps": self.fps,
+            "episode_length": self.episode_length,
             "is_success": self.cycle.is_success,
             "frames": self._frame,
             **self.cycle.metrics(),

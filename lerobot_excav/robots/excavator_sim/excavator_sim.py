@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
@@ -230,6 +231,7 @@ class ExcavatorSim(Robot):  # type: ignore[misc]  # LeRobot's classes are untype
 
     def _describe(self) -> dict[str, Any]:
         return {
+            "simulation_version": SIMULATION_VERSION,
             "scene_set": self.config.scene_set,
             "fps": self.config.fps,
             "soil": self.config.soil,

@@ -3,9 +3,9 @@
 `lerobot-record` stores pictures, state and action only. The log adds what a deterministic re-simulation
 needs (`lerobot-excav index` does it): one JSON object per recorded episode,
 
-    {"episode_index": 3, "scene_set": "train", "scene_id": 0, "target_id": 3, "fps": 10, "soil": "sand",
-     "fidelity": "standard", "observation_height": 96, "observation_width": 128, "task": "Scoop-v0",
-     "frames": 120, "restarts": []}
+    {"episode_index": 3, "simulation_version": 2, "scene_set": "train", "scene_id": 0, "target_id": 3,
+     "fps": 10, "soil": "sand", "fidelity": "standard", "observation_height": 96, "observation_width": 128,
+     "task": "Scoop-v0", "frames": 120, "restarts": []}
 
 `episode_index` is the episode's number in the dataset when it was recorded, `frames` how many actions were
 carried out, and `restarts` after which of them somebody restarted or changed the scene within the episode;

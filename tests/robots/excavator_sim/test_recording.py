@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 from lerobot_excav.robots.excavator_sim.session_log import SessionLog, default_path
@@ -86,6 +87,7 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
     assert lines_of(robot) == [
         {
             "episode_index": 0,
+            "simulation_version": SIMULATION_VERSION,
             "scene_set": "val",
             "scene_id": 3,
             "target_id": 0,
