@@ -79,15 +79,19 @@ def tool_at(edge_w: Array, pitch_rad: float, edge_velocity_w: Array, pitch_rate:
 
 
 def dig_cycle() -> Iterator[Tool]:
-    """Yield the bucket at every tick of one cycle: dig in the cone, lift, swing, dump over the box."""
+    """Yield the bucket at every tick of one cycle: dig in the cone, lift, swing, dump over the box.
+
+    It starts and stops smoothly at every keyframe, as a machine does.
+    """
     for (t0, edge0, pitch0), (t1, edge1, pitch1) in pairwise(_KEYFRAMES):
         start, travel = np.array(edge0), np.array(edge1) - np.array(edge0)
         turn = math.radians(pitch1 - pitch0)
         count = round((t1 - t0) / TICK_S)
         for k in range(1, count + 1):
-            share = k / count
+            time = k / count
+            share, rate = time * time * (3.0 - 2.0 * time), 6.0 * time * (1.0 - time) / (t1 - t0)
             pitch = math.radians(pitch0) + share * turn
-            yield tool_at(start + share * travel, pitch, travel / (t1 - t0), turn / (t1 - t0))
+            yield tool_at(start + share * travel, pitch, rate * travel, rate * turn)
 
 
 def real_time_factor(seed: int) -> dict[str, float]:

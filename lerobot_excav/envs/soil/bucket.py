@@ -1,4 +1,4 @@
-"""The bucket in the soil: where it was, what it cuts, what it holds."""
+"""The bucket in the soil: where it was, what it cuts, what enters it."""
 
 import math
 
@@ -6,20 +6,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.capacity import Capacity, Load
 from lerobot_excav.envs.soil.cutting import Window, cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, poses_between
 from lerobot_excav.envs.soil.parameters import SoilParameters
-from lerobot_excav.envs.soil.parcels import Parcels
-from lerobot_excav.envs.soil.spilling import (
-    buried_share,
-    opening_ends,
-    overflow_volume,
-    pour,
-    return_to_ground,
-)
+from lerobot_excav.envs.soil.parcels.birth import Intake
 from lerobot_excav.envs.soil.tool import Tool, ToolGeometry
 from lerobot_excav.errors import require
 
@@ -40,90 +32,117 @@ def _union(a: Window, b: Window) -> Window:
     return min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
 
 
-class Bucket:
-    """Bookkeeping of one tool.
+def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
+    """Return the volume [m3] of a level bucket with a heap: struck volume and a hip roof over the opening.
 
-    Volumes are volumes in the ground; in the bucket the soil takes `swell` times as much room.
+    A roof that rises with `slope_tan` from all four sides of a rectangle a <= b has the volume
+    slope_tan (a^2 b / 4 - a^3 / 12); at 1 it is the heap of SAE J296.
+    """
+    length = float(np.linalg.norm(geometry.profile_t[0] - geometry.profile_t[-1]))
+    a, b = sorted((length, float(geometry.inner_width_m)))
+    return geometry.struck_volume_m3 + slope_tan * (a**2 * b / 4 - a**3 / 12)
+
+
+class Bucket:
+    """One tool at work in a height field.
 
     Attributes:
-        payload_m3: Volume of the soil held [m3].
-        load: How it lies in the bucket; None before any tool was seen.
+        pose: Where it was in the last step; None if it was not there.
+        intake: Soil that has entered it and is not yet a parcel; None before any tool was seen.
     """
 
     def __init__(self, parameters: SoilParameters, fidelity: Fidelity) -> None:
-        """Start without a tool and without a payload."""
+        """Start without a tool."""
         self._parameters = parameters
         self._fidelity = fidelity
         self.clear()
 
     def clear(self) -> None:
-        """Empty the bucket and forget the tool."""
-        self.payload_m3 = 0.0
-        self.load: Load | None = None
-        self._pose: Pose | None = None
+        """Forget the tool."""
+        self.pose: Pose | None = None
+        self.intake: Intake | None = None
         self._window = _NO_WINDOW
-        self._capacity: Capacity | None = None
-        self._support = 0.0
 
     def leave(self, field: HeightField) -> None:
-        """Take note that the tool is gone; what it held stays in the bucket."""
-        if self._pose is None:
+        """Take note that the tool is gone; what waits to become parcels stays in it."""
+        if self.pose is None:
             return
-        self._pose = None
+        self.pose = None
         self._window = _NO_WINDOW
         field.uncover()
 
-    def move(self, tool: Tool, field: HeightField, floor_depth_m: float) -> float:
-        """Sweep the bucket from its last pose to this one; return the volume [m3] pushed over the border.
+    @property
+    def waiting_m3(self) -> float:
+        """Volume that has entered and is not yet a parcel [m3]."""
+        return 0.0 if self.intake is None else self.intake.waiting_m3
 
-        A tool that was not there in the last step cuts nothing.
+    def move(
+        self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float
+    ) -> tuple[float, float]:
+        """Sweep the bucket from its last pose to this one.
+
+        It takes in soil up to its heaped volume and pushes the rest ahead. A tool that was not there in the last step
+        cuts nothing.
+
+        Args:
+            tool: The bucket now.
+            field: The dig area, changed in place.
+            floor_depth_m: Depth of the rigid floor below z = 0.
+            load_m3: Volume in the ground of the parcels that it carries.
+
+        Returns:
+            Volumes [m3] that entered and that were pushed over the border.
 
         Raises:
             ConfigurationError: The tool jumped by more than `LARGEST_MOTION_M`.
         """
         pose = Pose.of(tool, floor_depth_m)
-        before, self._pose = self._pose, pose
-        if self._capacity is None or self._capacity.geometry is not tool.geometry:
-            self._capacity = Capacity(tool.geometry, self._parameters.slope_tan)
-        lower, upper = opening_ends(tool)
-        self._support = buried_share(
-            field.heights, field.grid, *pose.arrays, (*lower, *upper), tool.geometry.inner_width_m
-        )
-        lost = 0.0 if before is None else self._sweep(tool, before, pose, field)
-        self._cover(tool.geometry, pose, field)
-        return lost
-
-    def spill(self, tool: Tool, field: HeightField, parcels: Parcels, dt_s: float, rng: Generator) -> float:
-        """Let the excess leave at a finite rate; return the volume [m3] pushed over the border.
-
-        Before a buried edge it goes back to the ground, else it becomes parcels.
-        """
-        volume = overflow_volume(self._parameters, self.payload_m3, self._retained_volume(tool), dt_s)
-        lost = 0.0
-        if volume > 0.0:
-            self.payload_m3 = max(0.0, self.payload_m3 - volume)
-            if self._support > 0.0 and self._pose is not None:
-                lost = return_to_ground(tool.geometry, self._pose, field, opening_ends(tool)[0], volume)
-            else:
-                mass_kg = volume * self._parameters.density_kg_m3
-                pour(tool, parcels, mass_kg, self._parameters.parcel_mass_kg, dt_s, rng)
-        self._settle(tool)
-        return lost
-
-    def _retained_volume(self, tool: Tool) -> float:
-        if self._capacity is None:
-            return 0.0
-        return self._capacity.retained_volume(tool.pitch_rad, self._support) / self._parameters.swell
-
-    def _settle(self, tool: Tool) -> None:
-        """Work out how the payload lies."""
-        if self._capacity is not None:
-            self.load = self._capacity.load(
-                self.payload_m3 * self._parameters.swell, tool.pitch_rad, self._support
-            )
-
-    def _sweep(self, tool: Tool, before: Pose, now: Pose, field: HeightField) -> float:
+        before, self.pose = self.pose, pose
         geometry = tool.geometry
+        if self.intake is None or self.intake.geometry is not geometry:
+            waiting_m3 = self.waiting_m3
+            self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
+            self.intake.volumes[0, 0] = waiting_m3
+        moved = (0.0, 0.0)
+        if before is not None:
+            most = heaped_volume_m3(geometry, self._parameters.slope_tan) / self._parameters.swell
+            room = max(0.0, most - load_m3 - self.waiting_m3)
+            moved = self._sweep(geometry, before, pose, field, self.intake, room)
+        self._cover(geometry, pose, field)
+        return moved
+
+    def births(self, *, all_of_it: bool, rng: Generator) -> tuple[Array, Array]:
+        """Turn what waits into parcels, without pose.
+
+        Args:
+            all_of_it: Whether the rest that is less than a parcel goes too.
+            rng: Draws their offsets.
+
+        Returns:
+            (n, 3) positions in the tool frame [m] and (n,) masses [kg].
+        """
+        if self.intake is None or self.intake.waiting_m3 <= 0.0:
+            return np.zeros((0, 3)), np.zeros(0)
+        whole_kg = self._parameters.parcel_mass_kg(self._fidelity.parcel_radius_m)
+        density = self._parameters.density_kg_m3
+        points = self.intake.births(whole_kg / density, rng)
+        masses = np.full(len(points), whole_kg)
+        rest_kg = self.intake.waiting_m3 * density
+        if all_of_it and rest_kg > 0.0:
+            self.intake.clear()
+            points = np.concatenate([points, self.intake.geometry.centroid_t[None]])
+            masses = np.append(masses, rest_kg)
+        return points, masses
+
+    def _sweep(
+        self,
+        geometry: ToolGeometry,
+        before: Pose,
+        now: Pose,
+        field: HeightField,
+        intake: Intake,
+        room: float,
+    ) -> tuple[float, float]:
         moved = largest_motion(geometry.corners_t, before, now)
         require(
             moved <= LARGEST_MOTION_M,
@@ -131,10 +150,9 @@ class Bucket:
             "After placing the machine by hand, reset the soil or step once with tool=None.",
         )
         steps = max(1, math.ceil(moved / (self._fidelity.substep_cells * min(field.grid[2:]))))
-        retained = self._retained_volume(tool)
-        lost = 0.0
+        entered, lost = 0.0, 0.0
         for start, end in poses_between(before, now, steps):
-            entered, over = cut(
+            more, over = cut(
                 field.heights,
                 field.active,
                 field.grid,
@@ -143,11 +161,12 @@ class Bucket:
                 end.arrays,
                 field.window(end.place(geometry.corners_t)),
                 self._fidelity.vertical_bins,
-                max(0.0, retained - self.payload_m3),
+                max(0.0, room - entered),
+                (intake.volumes, intake.frame),
             )
-            self.payload_m3 += entered
+            entered += more
             lost += over
-        return lost
+        return entered, lost
 
     def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
         """Let the underside of the bucket hold avalanches back."""

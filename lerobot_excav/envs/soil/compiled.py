@@ -1,15 +1,47 @@
 """The one way this package compiles a kernel."""
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, cast
 
-from numba import njit
+import numba
+
+_SOURCES = Path(__file__).parents[1]
+
+
+def _cache_directory() -> Path:
+    """Return a directory for compiled code that belongs to exactly these kernels.
+
+    Numba looks at the file of a kernel alone: after a change in a kernel that it calls, in another file, it would go
+    on with the old code.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(_SOURCES.rglob("*.py")):
+        source = path.read_bytes()
+        if b"@kernel" in source:
+            digest.update(source)
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    beside = _SOURCES / "__pycache__"
+    if os.access(beside if beside.exists() else _SOURCES, os.W_OK):
+        return beside / name
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(home) / "lerobot_excav" / name
+
+
+_CACHE = _cache_directory()
 
 
 def kernel[F: Callable[..., Any]](function: F) -> F:
     """Compile a function to serial machine code that gives the same bits on every run.
 
     Strict floating point (no reassociation) and one thread: a soil step is a pure function of its inputs.
-    The compiled code is cached on disk beside the source, so only the first run of a machine compiles.
+    The compiled code is cached on disk, beside the source where that can be written, so only the first run compiles.
     """
-    return cast(F, njit(cache=True, fastmath=False, parallel=False)(function))
+    chosen = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = chosen or str(_CACHE)
+    try:
+        return cast(F, numba.njit(cache=True, fastmath=False, parallel=False)(function))
+    finally:
+        numba.config.CACHE_DIR = chosen

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
+from lerobot_excav.envs.soil.parcels.birth import gather
 from lerobot_excav.envs.soil.relaxation import mark_around
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 Window = tuple[int, int, int, int]
+Intake = tuple[Array, tuple[float, float, float, float, float]]
 
 OPENING = 0
 """Index of the opening among the planes of a tool."""
@@ -165,6 +167,7 @@ def cut_column(
     j: int,
     bins: int,
     room: float,
+    intake: Intake,
 ) -> tuple[float, float]:
     """Clear one column of the soil inside the bucket; return the volumes that entered and that left the grid."""
     x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
@@ -185,7 +188,9 @@ def cut_column(
         if face == ALREADY_INSIDE:
             face = top  # it fell in from above
         taken = min(share, room - entered) if face == OPENING else 0.0
-        entered += taken
+        if taken > 0.0:
+            gather(intake[0], intake[1], now[0], now[1], now[2], taken)
+            entered += taken
         if taken < share:
             direction = push_direction(planes, pose_now[1], face, before, now)
             lost += push_aside(
@@ -205,6 +210,7 @@ def cut(
     window: Window,
     bins: int,
     room: float,
+    intake: Intake,
 ) -> tuple[float, float]:
     """Move the bucket through the soil by one sub-step.
 
@@ -218,6 +224,7 @@ def cut(
         window: Index ranges i0, i1, j0, j1 that hold the bucket at the end.
         bins: Vertical samples per column.
         room: Volume that the bucket can still take [m3].
+        intake: Bins before the opening, which take what enters [m3], and their frame.
 
     Returns:
         Volumes [m3] that entered the bucket and that were pushed over the border.
@@ -227,7 +234,7 @@ def cut(
         for j in range(window[2], window[3]):
             if heights[i, j] > 0.0:
                 more = cut_column(
-                    heights, active, grid, planes, pose_before, pose_now, i, j, bins, room - entered
+                    heights, active, grid, planes, pose_before, pose_now, i, j, bins, room - entered, intake
                 )
                 entered += more[0]
                 lost += more[1]

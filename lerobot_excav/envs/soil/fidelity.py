@@ -10,19 +10,49 @@ class Fidelity:
     Attributes:
         vertical_bins: Samples along the height of a column inside the bucket.
         substep_cells: Largest motion of the tool per sub-step, in cells.
-        sweeps_per_tick: Avalanche sweeps per step; more let slopes come to rest sooner.
+        sweeps_per_tick: Avalanche sweeps per 0.02 s; more let slopes come to rest sooner.
         force_slices: Lateral slices of the cutting edge in the force model.
+        parcel_radius_m: Radius of one parcel.
+        substeps_per_tick: Sub-steps of the parcels' motion per 0.02 s.
+        most_awake: Bound on the number of parcels that move by themselves.
     """
 
     vertical_bins: int
     substep_cells: float
     sweeps_per_tick: int
     force_slices: int
+    parcel_radius_m: float
+    substeps_per_tick: int
+    most_awake: int
 
 
 FIDELITIES = {
-    "fast": Fidelity(vertical_bins=2, substep_cells=1.0, sweeps_per_tick=6, force_slices=4),
-    "standard": Fidelity(vertical_bins=4, substep_cells=0.5, sweeps_per_tick=8, force_slices=8),
-    "fine": Fidelity(vertical_bins=8, substep_cells=0.25, sweeps_per_tick=12, force_slices=12),
+    "fast": Fidelity(
+        vertical_bins=2,
+        substep_cells=1.0,
+        sweeps_per_tick=6,
+        force_slices=4,
+        parcel_radius_m=0.06,
+        substeps_per_tick=16,
+        most_awake=500,
+    ),
+    "standard": Fidelity(
+        vertical_bins=4,
+        substep_cells=0.5,
+        sweeps_per_tick=8,
+        force_slices=8,
+        parcel_radius_m=0.045,
+        substeps_per_tick=20,
+        most_awake=1000,
+    ),
+    "fine": Fidelity(
+        vertical_bins=8,
+        substep_cells=0.25,
+        sweeps_per_tick=12,
+        force_slices=12,
+        parcel_radius_m=0.036,
+        substeps_per_tick=40,
+        most_awake=2000,
+    ),
 }
 """Known levels by name; all keep the same ledger and are deterministic."""

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.tool import Tool
 
 Array = NDArray[np.float64]
@@ -43,15 +44,53 @@ def largest_motion(points_t: Array, before: Pose, now: Pose) -> float:
     return float(np.sqrt((moved * moved).sum(axis=1).max()))
 
 
-def _turned(rotation: Array, turn: Array, share: float) -> Array:
+@kernel
+def turned(rotation: Array, turn: Array, share: float) -> Array:
     """Turn a rotation by a share of a rotation vector in its own frame (Rodrigues)."""
-    angle = float(np.linalg.norm(turn)) * share
+    whole = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    angle = whole * share
     if angle < 1e-15:
-        return rotation
-    x, y, z = turn / np.linalg.norm(turn)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    result: Array = rotation @ (np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
+        return rotation.copy()
+    x, y, z = turn[0] / whole, turn[1] / whole, turn[2] / whole
+    sin, versine = math.sin(angle), 1.0 - math.cos(angle)
+    step = np.array(
+        [
+            [1.0 - versine * (y * y + z * z), versine * x * y - sin * z, versine * x * z + sin * y],
+            [versine * x * y + sin * z, 1.0 - versine * (x * x + z * z), versine * y * z - sin * x],
+            [versine * x * z - sin * y, versine * y * z + sin * x, 1.0 - versine * (x * x + y * y)],
+        ]
+    )
+    result = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            for c in range(3):
+                result[a, b] += rotation[a, c] * step[c, b]
     return result
+
+
+@kernel
+def _interpolate(
+    position: Array, travel: Array, rotation: Array, turn: Array, steps: int
+) -> tuple[Array, Array]:
+    """Return positions (steps + 1, 3) and rotations (steps + 1, 3, 3) along a straight line with a constant turn."""
+    positions, rotations = np.zeros((steps + 1, 3)), np.zeros((steps + 1, 3, 3))
+    for k in range(steps + 1):
+        positions[k] = position + k / steps * travel
+        rotations[k] = turned(rotation, turn, k / steps)
+    return positions, rotations
+
+
+def path(before: Pose, now: Pose, steps: int) -> tuple[Array, Array, Array]:
+    """Return the poses before each of some equal steps and after the last, and the whole turn.
+
+    Returns:
+        Positions (steps + 1, 3) [m], rotations (steps + 1, 3, 3), and the rotation vector (3,) in the world [rad].
+    """
+    turn = _rotation_vector(before.rotation.T @ now.rotation)
+    positions, rotations = _interpolate(
+        before.position, now.position - before.position, before.rotation, turn, steps
+    )
+    return positions, rotations, before.rotation @ turn
 
 
 def _rotation_vector(rotation: Array) -> Array:
@@ -71,7 +110,7 @@ def poses_between(before: Pose, now: Pose, steps: int) -> Iterator[tuple[Pose, P
     inner = [
         Pose(
             position=before.position + share * (now.position - before.position),
-            rotation=_turned(before.rotation, turn, share),
+            rotation=turned(before.rotation, turn, share),
         )
         for share in shares
     ]

@@ -25,13 +25,15 @@ class SoilParameters:
     Attributes:
         density_kg_m3: Bulk density, on the ground as in the air.
         friction_angle_rad: Internal friction; the repose angle is the same number, as in AGX Terrain.
-        cohesion_pa: Cohesion; enters the digging force only.
+        cohesion_pa: Cohesion, in the digging force and between parcels.
         swell: Volume of loosened soil in the bucket over its volume in the ground.
         steel_friction_angle_rad: Friction between soil and plate.
-        parcel_radius_m: Radius of one falling parcel.
         parcel_solid_fraction: Share of a bulk volume that the spheres of its parcels fill.
+        parcel_sliding_scale: Sliding friction between parcels over the tangent of the friction angle.
+        parcel_rolling_scale: The same of rolling friction.
+        ground_sliding_scale: Sliding friction of parcels on the ground over the tangent of the friction angle.
+        ground_rolling_scale: The same of rolling friction.
         penetration_scale: Factor on the bearing resistance of the cutting edge.
-        spill_time_s: Time constant of the flow over the spilling edge.
     """
 
     density_kg_m3: float
@@ -39,10 +41,12 @@ class SoilParameters:
     cohesion_pa: float
     swell: float
     steel_friction_angle_rad: float
-    parcel_radius_m: float = 0.045
     parcel_solid_fraction: float = 0.60
+    parcel_sliding_scale: float = 0.62
+    parcel_rolling_scale: float = 0.37
+    ground_sliding_scale: float = 1.2
+    ground_rolling_scale: float = 0.75
     penetration_scale: float = 1.0
-    spill_time_s: float = 0.25
 
     def __post_init__(self) -> None:
         for name, low, high in _ALLOWED:
@@ -57,11 +61,10 @@ class SoilParameters:
         """Tangent of the repose angle."""
         return math.tan(self.friction_angle_rad)
 
-    @property
-    def parcel_mass_kg(self) -> float:
-        """Mass of one parcel: its sphere carries the voids around it, so that a heap has the bulk density."""
-        sphere_m3 = 4.0 / 3.0 * math.pi * self.parcel_radius_m**3
-        return self.density_kg_m3 * sphere_m3 / self.parcel_solid_fraction
+    def parcel_mass_kg(self, radius_m: float) -> float:
+        """Return the mass of a parcel: its sphere carries the voids around it, so that a heap has the bulk density."""
+        sphere_m3 = 4.0 / 3.0 * math.pi * radius_m**3
+        return self.density_kg_m3 * sphere_m3 / self.parcel_solid_fraction / self.swell
 
 
 _ALLOWED = (
@@ -70,10 +73,12 @@ _ALLOWED = (
     ("cohesion_pa", 0.0, 1e5),
     ("swell", 1.0, 2.0),
     ("steel_friction_angle_rad", 0.0, 1.2),
-    ("parcel_radius_m", 1e-3, 0.5),
     ("parcel_solid_fraction", 0.3, 1.0),
+    ("parcel_sliding_scale", 0.0, 10.0),
+    ("parcel_rolling_scale", 0.0, 10.0),
+    ("ground_sliding_scale", 0.0, 10.0),
+    ("ground_rolling_scale", 0.0, 10.0),
     ("penetration_scale", 0.0, 100.0),
-    ("spill_time_s", 1e-3, 10.0),
 )
 
 _AGX = "Algoryx AGX Terrain material presets (AGXUnreal assets, Apache-2.0), values re-typed"
@@ -86,12 +91,14 @@ PROVENANCE = {
     "steel_friction_angle_rad": Provenance(
         unit="rad", source="2/3 of the friction angle, McKyes 1985", kind="derived"
     ),
-    "parcel_radius_m": Provenance(unit="m", source="about one cell of 5 cm", kind="guess"),
     "parcel_solid_fraction": Provenance(
         unit="1", source="random packing of spheres, 0.60 to 0.64", kind="paper"
     ),
+    "parcel_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
+    "parcel_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
+    "ground_sliding_scale": Provenance(unit="1", source="column collapse (T1)", kind="tuned"),
+    "ground_rolling_scale": Provenance(unit="1", source="column collapse (T1)", kind="tuned"),
     "penetration_scale": Provenance(unit="1", source="bearing theory as it is", kind="guess"),
-    "spill_time_s": Provenance(unit="s", source="a full dump takes about 1 s", kind="guess"),
 }
 """Source of each field of `SoilParameters`."""
 

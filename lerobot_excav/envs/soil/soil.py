@@ -8,8 +8,8 @@ from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.forces import DiggingResistance
 from lerobot_excav.envs.soil.height_field import HeightField
-from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
-from lerobot_excav.envs.soil.parcels import IN_BOX, NO_BOX, ON_GRID, Box, Parcels
+from lerobot_excav.envs.soil.loose import TICK_S, LooseSoil
+from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, PRESETS, SoilParameters
 from lerobot_excav.envs.soil.tool import Reaction, Tool
 from lerobot_excav.errors import require, require_choice
 
@@ -32,18 +32,18 @@ def _whole_cells(length_m: float, cell_size_m: float, field: str) -> int:
 
 
 class Soil:
-    """Deformable soil on a rigid floor, a bucket's load, soil in the air and soil in a target box.
+    """Deformable soil on a rigid floor, loose parcels, a bucket's load and soil in a target box.
 
     World frame: origin at the centre of the extent, z up. Heights count from the rigid floor, which lies
     `floor_depth_m` below z = 0. Around the extent the ground is level at z = 0; soil that gets there is out of
     bounds. Every kilogram is in one entry of `ledger_kg`, whose sum no step changes.
 
     Args:
-        preset: Name of the soil, one of `PRESETS`.
+        preset: Name of the soil, one of `PRESETS`, or parameters of one's own.
         extent_m: Size of the dig area along x and y; a whole number of cells.
         cell_size_m: Size of a column.
         fidelity: Numerical effort, one of `FIDELITIES`.
-        seed: Seed of the jitter of spilled parcels; `reset` starts it anew.
+        seed: Seed of the offsets of new parcels; `reset` starts it anew.
         container: Target box outside of the dig area, or None.
         floor_depth_m: Depth of the rigid floor below z = 0.
 
@@ -53,7 +53,7 @@ class Soil:
 
     def __init__(
         self,
-        preset: str = "sand",
+        preset: str | SoilParameters = "sand",
         extent_m: tuple[float, float] = (6.0, 6.0),
         cell_size_m: float = 0.05,
         fidelity: str = "standard",
@@ -61,7 +61,9 @@ class Soil:
         container: Container | None = None,
         floor_depth_m: float = 0.0,
     ) -> None:
-        require_choice("preset", preset, PRESETS)
+        if not isinstance(preset, SoilParameters):
+            require_choice("preset", preset, PRESETS)
+            preset = PRESETS[preset]
         require_choice("fidelity", fidelity, FIDELITIES)
         require(floor_depth_m >= 0.0, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above.")
         require(
@@ -72,16 +74,17 @@ class Soil:
             _whole_cells(extent_m[0], cell_size_m, "extent_m[0]"),
             _whole_cells(extent_m[1], cell_size_m, "extent_m[1]"),
         )
-        self.parameters: SoilParameters = PRESETS[preset]
+        self.parameters: SoilParameters = preset
         self.fidelity = FIDELITIES[fidelity]
         self.container = container
         self.floor_depth_m = float(floor_depth_m)
         self._seed = seed
         self._field = HeightField(shape, (cell_size_m, cell_size_m), self.floor_depth_m)
         self._box_field = _box_field(container, cell_size_m)
-        self._box = _box_numbers(container)
-        self._parcels = Parcels()
         self._bucket = Bucket(self.parameters, self.fidelity)
+        self._loose = LooseSoil(
+            self.parameters, self.fidelity, self._field, self._box_field, container, self.floor_depth_m
+        )
         self._resistance = DiggingResistance(self.parameters, self.fidelity.force_slices)
         self.reset()
 
@@ -96,14 +99,17 @@ class Soil:
         """
         self._field.reset(heights_m)
         self._box_field.reset(None)
-        self._parcels.clear()
+        self._loose.clear()
         self._bucket.clear()
+        self._resistance.forget()
         self._out_of_bounds_m3 = 0.0
         self._out_of_bounds_kg = 0.0
         self._rng = np.random.default_rng(self._seed)
 
     def add_parcels(self, positions_w: ArrayLike, velocities_w: ArrayLike) -> None:
-        """Add soil in the air; each parcel brings `parcel_mass_kg` into the ledger.
+        """Add loose soil; each parcel brings `parcel_mass_kg` into the ledger.
+
+        Beyond the fidelity's bound on awake parcels, a new one joins its nearest one.
 
         Args:
             positions_w: (n, 3) centres [m].
@@ -120,7 +126,9 @@ class Soil:
         )
         finite = bool(np.isfinite(positions).all() and np.isfinite(velocities).all())
         require(finite, "positions_w or velocities_w holds values that are not finite.")
-        self._parcels.add(positions, velocities, np.full(len(positions), self.parcel_mass_kg))
+        positions[:, 2] += self.floor_depth_m
+        masses = np.full(len(positions), self.parcel_mass_kg)
+        self._loose.population.add(positions, velocities, masses)
 
     def step(self, dt_s: float = 0.02, tool: Tool | None = None) -> Reaction:
         """Advance by one step.
@@ -137,38 +145,64 @@ class Soil:
             ConfigurationError: The duration is out of range, or the tool jumped.
         """
         require(0.0 < dt_s <= 0.1, f"dt_s={dt_s!r}; allowed: above 0 and at most 0.1 s.")
-        force: Array = np.zeros(3)
-        torque: Array = np.zeros(3)
+        before, entered = self._bucket.pose, 0.0
         if tool is None:
             self._bucket.leave(self._field)
+            self._resistance.forget()
         else:
-            force, torque = self._resistance.wrench(
-                self._field.heights, self._field.grid, tool, self.floor_depth_m
-            )
-            self._out_of_bounds_m3 += self._bucket.move(tool, self._field, self.floor_depth_m)
-            self._out_of_bounds_m3 += self._bucket.spill(tool, self._field, self._parcels, dt_s, self._rng)
-        self._fly(dt_s)
+            load_m3 = self._load_kg / self.density_kg_m3
+            entered, lost = self._bucket.move(tool, self._field, self.floor_depth_m, load_m3)
+            self._out_of_bounds_m3 += lost
+            self._give_birth(is_last=entered == 0.0 and load_m3 == 0.0)
+        geometry = None if tool is None else tool.geometry
+        self._out_of_bounds_kg += self._loose.step(
+            geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0
+        )
+        sweeps = max(1, round(self.fidelity.sweeps_per_tick * dt_s / TICK_S))
         for field in (self._field, self._box_field):
-            self._out_of_bounds_m3 += field.relax(self.fidelity.sweeps_per_tick, self.parameters.slope_tan)
-        load = self._bucket.load
-        com = np.zeros(3) if load is None else load.com_t
-        return Reaction(
-            force_w_n=force, torque_w_nm=torque, payload_mass_kg=self.payload_mass_kg, payload_com_t=com
+            self._out_of_bounds_m3 += field.relax(sweeps, self.parameters.slope_tan)
+        return self._reaction(tool, dt_s)
+
+    def _reaction(self, tool: Tool | None, dt_s: float) -> Reaction:
+        """Return what the soil does to the tool at the end of a step."""
+        com_t = self._payload_com_t(tool)
+        if tool is None:
+            return Reaction.free(self.payload_mass_kg, com_t)
+        heights = self._field.heights
+        return self._resistance.react(
+            heights,
+            self._loose.weighed_heights(),
+            self._field.grid,
+            tool,
+            self.floor_depth_m,
+            dt_s,
+            self.payload_mass_kg,
+            com_t,
         )
 
-    def _fly(self, dt_s: float) -> None:
-        """Move the soil in the air and merge what landed."""
-        ground = (self._field.heights, self._field.grid, -self.floor_depth_m)
-        inside = (self._box_field.heights, self._box_field.grid)
-        landed = self._parcels.step(dt_s, self.parcel_radius_m, ground, inside, self._box)
-        for place, parcels in landed.items():
-            volumes: Array = parcels.masses_kg / self.density_kg_m3
-            if place == ON_GRID:
-                self._field.deposit(parcels.points_w, volumes)
-            elif place == IN_BOX and self.container is not None:
-                self._box_field.deposit(self.container.to_local(parcels.points_w), volumes)
-            else:
-                self._out_of_bounds_kg += float(parcels.masses_kg.sum())
+    def _give_birth(self, *, is_last: bool) -> None:
+        """Turn the soil that has entered the bucket into parcels at rest, where it was."""
+        points_t, masses = self._bucket.births(all_of_it=is_last, rng=self._rng)
+        pose = self._bucket.pose
+        if len(masses) and pose is not None:
+            self._loose.population.add(pose.place(points_t), np.zeros_like(points_t), masses)
+
+    def _payload_com_t(self, tool: Tool | None) -> Array:
+        """Return the centre of mass of the load, or the centroid of an empty bucket [m]."""
+        state, pose = self._loose.population.state, self._bucket.pose
+        if tool is None or pose is None:
+            return np.zeros(3)
+        is_load = state.load == 1
+        mass = float(state.masses[is_load].sum())
+        if mass == 0.0:
+            return tool.geometry.centroid_t
+        centre = state.masses[is_load] @ state.positions[is_load] / mass
+        return np.asarray((centre - pose.position) @ pose.rotation)
+
+    @property
+    def _load_kg(self) -> float:
+        state = self._loose.population.state
+        return float(state.masses[state.load == 1].sum())
 
     @property
     def heights_m(self) -> Array:
@@ -197,37 +231,80 @@ class Soil:
 
     @property
     def parcel_positions_w(self) -> Array:
-        """(n, 3) centres of the parcels in the air [m]: a copy."""
-        return self._parcels.positions_w.copy()
+        """(n, 3) centres of all parcels, those in the bucket included [m]: a copy."""
+        return self._loose.population.state.positions - np.array([0.0, 0.0, self.floor_depth_m])
+
+    @property
+    def parcel_velocities_w(self) -> Array:
+        """(n, 3) velocities of all parcels [m/s]: a copy."""
+        return self._loose.population.state.velocities.copy()
+
+    @property
+    def parcel_radii_m(self) -> Array:
+        """(n,) radius of each parcel: a copy. Parcels that others have joined are larger than `parcel_radius_m`."""
+        return self._loose.population.state.radii.copy()
+
+    @property
+    def parcel_masses_kg(self) -> Array:
+        """(n,) mass of each parcel: a copy."""
+        return self._loose.population.state.masses.copy()
+
+    @property
+    def parcel_is_load(self) -> NDArray[np.bool_]:
+        """(n,) whether each parcel belongs to the load of the bucket."""
+        return self._loose.population.state.load == 1
+
+    @property
+    def parcel_is_asleep(self) -> NDArray[np.bool_]:
+        """(n,) whether each parcel rests in the bucket and moves with it as one body."""
+        return self._loose.population.state.asleep == 1
+
+    @property
+    def awake_parcel_count(self) -> int:
+        """Number of parcels that move by themselves."""
+        return self._loose.population.awake_count
 
     @property
     def parcel_radius_m(self) -> float:
-        """Radius of a parcel."""
-        return self.parameters.parcel_radius_m
+        """Radius of a whole parcel."""
+        return self.fidelity.parcel_radius_m
 
     @property
     def parcel_mass_kg(self) -> float:
         """Mass of a whole parcel."""
-        return self.parameters.parcel_mass_kg
+        return self._loose.whole_kg
 
     @property
     def payload_mass_kg(self) -> float:
         """Mass of the soil in the bucket."""
-        return self._bucket.payload_m3 * self.density_kg_m3
+        return self._load_kg + self._bucket.waiting_m3 * self.density_kg_m3
 
     @property
-    def payload_surface_t(self) -> Array:
-        """(n, 2) polyline (x_t, z_t) of the load's free surface [m], half-way between the side plates; n may be 0."""
-        load = self._bucket.load
-        return np.zeros((0, 2)) if load is None else load.surface_t.copy()
+    def airborne_mass_kg(self) -> float:
+        """Mass of the parcels that are not in the bucket: falling, or not yet at rest on the ground."""
+        state = self._loose.population.state
+        return float(state.masses[state.load == 0].sum())
+
+    @property
+    def box_mass_kg(self) -> float:
+        """Mass of the soil at rest in the target box."""
+        return self._box_field.volume_m3 * self.density_kg_m3
+
+    def mechanical_energy_j(self) -> float:
+        """Return the kinetic energy of all parcels and their potential energy above the rigid floor."""
+        state = self._loose.population.state
+        spinning = 0.4 * state.masses * state.radii**2 * (state.spins**2).sum(axis=1)
+        moving = state.masses * (state.velocities**2).sum(axis=1)
+        potential = GRAVITY_M_S2 * float(state.masses @ state.positions[:, 2])
+        return 0.5 * float((moving + spinning).sum()) + potential
 
     def ledger_kg(self) -> dict[str, float]:
         """Return the mass in each place; the sum is constant but for `reset` and `add_parcels`."""
         return {
             "grid": self._field.volume_m3 * self.density_kg_m3,
-            "parcels": self._parcels.mass_kg,
+            "parcels": self.airborne_mass_kg,
             "bucket": self.payload_mass_kg,
-            "box": self._box_field.volume_m3 * self.density_kg_m3,
+            "box": self.box_mass_kg,
             "out_of_bounds": self._out_of_bounds_m3 * self.density_kg_m3 + self._out_of_bounds_kg,
         }
 
@@ -260,12 +337,3 @@ def _box_field(container: Container | None, cell_size_m: float) -> HeightField:
     lengths = 2.0 * container.half_extent_m
     shape = (max(1, round(lengths[0] / cell_size_m)), max(1, round(lengths[1] / cell_size_m)))
     return HeightField(shape, (lengths[0] / shape[0], lengths[1] / shape[1]), container.wall_height_m)
-
-
-def _box_numbers(container: Container | None) -> Box:
-    if container is None:
-        return NO_BOX
-    x, y, z = (float(v) for v in container.center_w)
-    cos, sin = (float(v) for v in container.axes_w[0])
-    half_x, half_y = (float(v) for v in container.half_extent_m)
-    return (x, y, z, half_x, half_y, z + container.wall_height_m, cos, sin)

@@ -1,0 +1,192 @@
+"""The loose soil of one `Soil`: builds what parcels need from tool, fields and box, and steps them."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.container import Container
+from lerobot_excav.envs.soil.fidelity import Fidelity
+from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.motion import Pose, largest_motion, path
+from lerobot_excav.envs.soil.parameters import SoilParameters
+from lerobot_excav.envs.soil.parcels.contact import Law
+from lerobot_excav.envs.soil.parcels.dynamics import Laws
+from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxNumbers, ToolPath
+from lerobot_excav.envs.soil.parcels.population import Landed, Population
+from lerobot_excav.envs.soil.parcels.store import WALLS
+from lerobot_excav.envs.soil.tool import ToolGeometry
+
+Array = NDArray[np.float64]
+
+TICK_S = 0.02
+"""Step for which the numbers of a `Fidelity` are meant."""
+
+_PHASE_PER_SUBSTEP = 0.2
+"""Phase of a parcel on its contact spring per sub-step [rad] (tuned: stable up to a dozen contacts)."""
+
+_FARTHEST = 0.2
+"""Motion of the bucket per sub-step, in radii, that no parcel can be overrun by."""
+
+_NO_PLACE: Array = np.zeros((2, 3))
+_NO_TURN: Array = np.stack([np.eye(3), np.eye(3)])
+
+
+def _laws(parameters: SoilParameters, fidelity: Fidelity, mass_kg: float) -> Laws:
+    """Return the coefficients of the contacts; the stiffness is the highest that the sub-steps resolve."""
+    stiffness = mass_kg * (_PHASE_PER_SUBSTEP * fidelity.substeps_per_tick / TICK_S) ** 2
+    p, tan = parameters, parameters.slope_tan
+    rolling = p.parcel_rolling_scale * tan
+    ground = (p.ground_sliding_scale * tan, p.ground_rolling_scale * tan)
+    return Laws(
+        parcel=Law(stiffness, p.parcel_sliding_scale * tan, rolling, p.cohesion_pa),
+        ground=Law(stiffness, *ground, p.cohesion_pa),
+        steel=Law(stiffness, math.tan(p.steel_friction_angle_rad), rolling, 0.0),
+    )
+
+
+def _box_numbers(container: Container | None, floor_depth_m: float) -> BoxNumbers:
+    if container is None:
+        return NO_BOX
+    x, y, z = (float(v) for v in container.center_w)
+    z += floor_depth_m
+    cos, sin = (float(v) for v in container.axes_w[0])
+    half_x, half_y = (float(v) for v in container.half_extent_m)
+    return (x, y, z, half_x, half_y, z + container.wall_height_m, cos, sin)
+
+
+class LooseSoil:
+    """Parcels of one soil and their surroundings.
+
+    Args:
+        parameters: The soil.
+        fidelity: Numerical effort.
+        field: The dig area.
+        box_field: The soil in the target box.
+        container: The target box, if there is one.
+        floor_depth_m: Depth of the rigid floor below z = 0.
+
+    Attributes:
+        population: All parcels; z counts from the rigid floor.
+        whole_kg: Mass of a whole parcel.
+    """
+
+    def __init__(
+        self,
+        parameters: SoilParameters,
+        fidelity: Fidelity,
+        field: HeightField,
+        box_field: HeightField,
+        container: Container | None,
+        floor_depth_m: float,
+    ) -> None:
+        self.whole_kg = parameters.parcel_mass_kg(fidelity.parcel_radius_m)
+        self._fidelity = fidelity
+        self._field, self._box_field = field, box_field
+        self._container = container
+        self._box = _box_numbers(container, floor_depth_m)
+        self._level_z = floor_depth_m
+        self._density_kg_m3 = parameters.density_kg_m3
+        self.population = Population(
+            WALLS + 3,
+            _laws(parameters, fidelity, self.whole_kg),
+            fidelity.parcel_radius_m,
+            self.whole_kg,
+            fidelity.most_awake,
+        )
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove all parcels and forget the bucket."""
+        self.population.clear()
+        self._tool = ToolPath(
+            0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3)
+        )
+
+    def step(
+        self,
+        geometry: ToolGeometry | None,
+        before: Pose | None,
+        now: Pose | None,
+        dt_s: float,
+        *,
+        cutting: bool,
+    ) -> float:
+        """Move the parcels along with the bucket and let those at rest become ground.
+
+        Args:
+            geometry: The bucket, or None if there is none.
+            before: Where it was, or None if it was not there.
+            now: Where it is, or None.
+            dt_s: Duration.
+            cutting: Whether soil entered it in this step.
+
+        Returns:
+            Mass [kg] that landed out of bounds.
+        """
+        if geometry is None or now is None:
+            tool = self._without_tool(dt_s)
+        else:
+            tool = self._with_tool(geometry, now if before is None else before, now, dt_s)
+        self._tool = tool
+        self.population.allow_plates(len(tool.profile) + 1 + WALLS)
+        self.population.step(tool, self._site(), dt_s, cutting=cutting)
+        return self._merge(self.population.settle(dt_s))
+
+    def weighed_heights(self) -> Array:
+        """Return (nx, ny) heights of the dig area [m] with the loose parcels outside of the bucket spread on their columns."""
+        state, field = self.population.state, self._field
+        rows = np.flatnonzero((state.load == 0) & field.contains(state.positions[:, :2]))
+        if len(rows) == 0:
+            return field.heights
+        x0, y0, dx, dy = field.grid
+        i = np.rint((state.positions[rows, 0] - x0) / dx).astype(np.int64)
+        j = np.rint((state.positions[rows, 1] - y0) / dy).astype(np.int64)
+        heights = field.heights.copy()
+        np.add.at(heights, (i, j), state.masses[rows] / self._density_kg_m3 / field.cell_area_m2)
+        return heights
+
+    def _steps(self, dt_s: float) -> int:
+        return max(1, math.ceil(self._fidelity.substeps_per_tick * dt_s / TICK_S - 1e-9))
+
+    def _with_tool(self, geometry: ToolGeometry, before: Pose, now: Pose, dt_s: float) -> ToolPath:
+        moved = largest_motion(geometry.corners_t, before, now)
+        farthest = _FARTHEST * self._fidelity.parcel_radius_m
+        steps = max(self._steps(dt_s), math.ceil(moved / farthest))
+        positions, rotations, turn = path(before, now, steps)
+        return ToolPath(
+            1,
+            geometry.profile_t,
+            geometry.planes_t,
+            0.5 * float(geometry.inner_width_m),
+            positions,
+            rotations,
+            (now.position - before.position) / dt_s,
+            turn / dt_s,
+        )
+
+    def _without_tool(self, dt_s: float) -> ToolPath:
+        """Return the path of no bucket; a load stays asleep in the one that went away."""
+        if self._tool.present:
+            self.population.freeze_load(self._tool)
+        steps = self._steps(dt_s)
+        nowhere = np.repeat(self._tool.positions[-1:], steps + 1, axis=0)
+        unturned = np.repeat(self._tool.rotations[-1:], steps + 1, axis=0)
+        return self._tool._replace(present=0, positions=nowhere, rotations=unturned)
+
+    def _site(self) -> Site:
+        field, inside = self._field, self._box_field
+        return Site(field.heights, field.grid, inside.heights, inside.grid, self._box, self._level_z)
+
+    def _merge(self, landed: Landed) -> float:
+        """Put landed parcels on the fields; return the mass [kg] that belongs to neither."""
+        if len(landed.masses_kg) == 0:
+            return 0.0
+        volumes = landed.masses_kg / self._density_kg_m3
+        on_ground, in_box = landed.is_on_ground, landed.is_in_box
+        if on_ground.any():
+            self._field.deposit(landed.points_w[on_ground], volumes[on_ground])
+        if self._container is not None and in_box.any():
+            self._box_field.deposit(self._container.to_local(landed.points_w[in_box]), volumes[in_box])
+        return float(landed.masses_kg[~on_ground & ~in_box].sum())

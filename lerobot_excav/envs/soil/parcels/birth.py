@@ -1,0 +1,100 @@
+"""Birth of parcels: soil that enters the bucket gathers before it, and leaves as whole parcels where it was cut."""
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.tool import ToolGeometry
+
+Array = NDArray[np.float64]
+
+_JITTER = 0.25
+"""Largest random offset of a new parcel, in radii: no lattice builds up (guess)."""
+
+_INSET = 0.9
+"""Distance of a new parcel from plates and opening, in radii."""
+
+_PASSES = 3
+
+
+@kernel
+def gather(
+    volumes: Array,
+    frame: tuple[float, float, float, float, float],
+    x: float,
+    y: float,
+    z: float,
+    volume: float,
+) -> None:
+    """Book a volume in the bin of the opening before which a tool point lies.
+
+    Args:
+        volumes: (a, b) waiting volumes along the opening and across it [m3], changed in place.
+        frame: x_t, z_t of the edge, vector to the lip over its squared length, and the width [m].
+        x: Of the point [m].
+        y: The same.
+        z: The same.
+        volume: To book [m3].
+    """
+    share = (x - frame[0]) * frame[2] + (z - frame[1]) * frame[3]
+    i = min(max(int(share * volumes.shape[0]), 0), volumes.shape[0] - 1)
+    j = min(max(int((y / frame[4] + 0.5) * volumes.shape[1]), 0), volumes.shape[1] - 1)
+    volumes[i, j] += volume
+
+
+class Intake:
+    """Soil on its way into one bucket.
+
+    Bins of about one parcel tile the opening. A parcel is born before the fullest bin as soon as all bins together
+    hold one, so that never more than one parcel's volume waits, and new parcels keep apart like the soil they were.
+
+    Args:
+        geometry: The bucket.
+        radius_m: Of a parcel.
+    """
+
+    def __init__(self, geometry: ToolGeometry, radius_m: float) -> None:
+        self.geometry = geometry
+        self._radius_m = radius_m
+        self._edge, self._lip = geometry.profile_t[0], geometry.profile_t[-1]
+        across = self._lip - self._edge
+        length = float(np.linalg.norm(across))
+        bins = (
+            max(1, round(length / (2 * radius_m))),
+            max(1, round(geometry.inner_width_m / (2 * radius_m))),
+        )
+        self.volumes: Array = np.zeros(bins)
+        x, z = (float(v) for v in across / length**2)
+        self.frame = (float(self._edge[0]), float(self._edge[1]), x, z, float(geometry.inner_width_m))
+
+    @property
+    def waiting_m3(self) -> float:
+        """Volume that has entered the bucket and is not yet a parcel."""
+        return max(0.0, float(self.volumes.sum()))
+
+    def clear(self) -> None:
+        """Forget what waits."""
+        self.volumes[:] = 0.0
+
+    def births(self, parcel_m3: float, rng: Generator) -> Array:
+        """Take whole parcels out of the bins; return where they begin, (n, 3) in the tool frame [m]."""
+        count = int(self.waiting_m3 / parcel_m3)
+        points = np.zeros((count, 3))
+        for k in range(count):
+            i, j = np.unravel_index(int(np.argmax(self.volumes)), self.volumes.shape)
+            self.volumes[i, j] -= parcel_m3
+            share = ((i + 0.5) / self.volumes.shape[0], (j + 0.5) / self.volumes.shape[1])
+            x, z = self._edge + share[0] * (self._lip - self._edge)
+            points[k] = x, (share[1] - 0.5) * self.geometry.inner_width_m, z
+        points += rng.uniform(-_JITTER, _JITTER, points.shape) * self._radius_m
+        return self._inside(points)
+
+    def _inside(self, points: Array) -> Array:
+        """Move points off the plates and the opening, into the bucket."""
+        planes = self.geometry.planes_t
+        for _ in range(_PASSES):
+            for n in planes:
+                missing = np.maximum(0.0, points @ n[:3] - n[3] + _INSET * self._radius_m)
+                points = points - missing[:, None] * n[:3]
+        return points

@@ -1,0 +1,192 @@
+"""Motion of the parcels: contact forces and semi-implicit Euler sub-steps."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
+from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
+from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
+from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
+from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket
+from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, State
+
+Array = NDArray[np.float64]
+
+LARGEST_SPEED_M_S = 12.0
+"""Speed limit of a parcel: a fall from 7 m. Above, it could pass through a plate."""
+
+WAKING_SPEED_M_S = 0.3
+"""A parcel that hits the sleeping load faster than this wakes it (guess)."""
+
+
+class Laws(NamedTuple):
+    """Coefficients of the contacts between parcels, with the ground and with steel."""
+
+    parcel: Law
+    ground: Law
+    steel: Law
+
+
+@kernel
+def _carry(state: State, tool: ToolPath, step: int) -> None:
+    """Move the sleeping parcels with the bucket."""
+    position, rotation = tool.positions[step], tool.rotations[step]
+    w = (tool.angular[0], tool.angular[1], tool.angular[2])
+    for i in range(len(state.masses)):
+        if state.asleep[i]:
+            q = (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2])
+            arm = (
+                rotation[0, 0] * q[0] + rotation[0, 1] * q[1] + rotation[0, 2] * q[2],
+                rotation[1, 0] * q[0] + rotation[1, 1] * q[1] + rotation[1, 2] * q[2],
+                rotation[2, 0] * q[0] + rotation[2, 1] * q[1] + rotation[2, 2] * q[2],
+            )
+            turning = cross(w, arm)
+            for a in range(3):
+                state.positions[i, a] = position[a] + arm[a]
+                state.velocities[i, a] = tool.linear[a] + turning[a]
+                state.spins[i, a] = w[a]
+
+
+@kernel
+def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
+    """Add the forces of touching parcels on each other.
+
+    Args:
+        state: All parcels, changed in place.
+        pairs: Those that may touch; the memory of their contacts is changed.
+        law: Coefficients.
+        dt: Duration [s].
+
+    Returns:
+        Fastest closing speed between a sleeping parcel and one that is awake [m/s].
+    """
+    positions, velocities, spins = state.positions, state.velocities, state.spins
+    masses, radii, asleep = state.masses, state.radii, state.asleep
+    forces, torques, springs = state.forces, state.torques, pairs.springs
+    hit = 0.0
+    for i in range(len(masses)):
+        ri = radii[i]
+        for k in range(pairs.start[i], pairs.start[i + 1]):
+            j = pairs.partner[k]
+            rj = radii[j]
+            d0 = positions[i, 0] - positions[j, 0]
+            d1 = positions[i, 1] - positions[j, 1]
+            d2 = positions[i, 2] - positions[j, 2]
+            far = d0 * d0 + d1 * d1 + d2 * d2
+            if far >= (ri + rj) * (ri + rj) or far == 0.0:
+                if pairs.closed[k]:
+                    forget(springs, k)
+                    pairs.closed[k] = 0
+                continue
+            pairs.closed[k] = 1
+            distance = math.sqrt(far)
+            n = (d0 / distance, d1 / distance, d2 / distance)
+            ai, aj = distance * ri / (ri + rj), distance * rj / (ri + rj)  # arms to the middle of the lens
+            wi, wj = (spins[i, 0], spins[i, 1], spins[i, 2]), (spins[j, 0], spins[j, 1], spins[j, 2])
+            turning = cross((ai * wi[0] + aj * wj[0], ai * wi[1] + aj * wj[1], ai * wi[2] + aj * wj[2]), n)
+            velocity = (
+                velocities[i, 0] - velocities[j, 0] - turning[0],
+                velocities[i, 1] - velocities[j, 1] - turning[1],
+                velocities[i, 2] - velocities[j, 2] - turning[2],
+            )
+            arm = ai * aj / (ai + aj)
+            rolling = cross((wi[0] - wj[0], wi[1] - wj[1], wi[2] - wj[2]), n)
+            rolling = (arm * rolling[0], arm * rolling[1], arm * rolling[2])
+            mass = masses[i] * masses[j] / (masses[i] + masses[j])
+            if asleep[i] != asleep[j]:
+                mass = masses[j] if asleep[i] else masses[i]
+                hit = max(hit, -dot(velocity, n))
+            force, roll = contact(
+                springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt
+            )
+            torque, rolling_torque = cross(n, force), cross(n, roll)
+            for a in range(3):
+                forces[i, a] += force[a]
+                forces[j, a] -= force[a]
+                torques[i, a] += -ai * torque[a] + arm * rolling_torque[a]
+                torques[j, a] += -aj * torque[a] - arm * rolling_torque[a]
+    return hit
+
+
+@kernel
+def _integrate(state: State, dt: float) -> None:
+    """Advance the awake parcels: velocities first, then positions with the new velocities."""
+    for i in range(len(state.masses)):
+        if state.asleep[i]:
+            continue
+        inertia = 0.4 * state.masses[i] * state.radii[i] ** 2
+        speed = 0.0
+        for a in range(3):
+            state.velocities[i, a] += dt * state.forces[i, a] / state.masses[i]
+            state.spins[i, a] += dt * state.torques[i, a] / inertia
+        state.velocities[i, 2] -= dt * GRAVITY_M_S2
+        for a in range(3):
+            speed += state.velocities[i, a] ** 2
+        if speed > LARGEST_SPEED_M_S**2:
+            share = LARGEST_SPEED_M_S / math.sqrt(speed)
+            for a in range(3):
+                state.velocities[i, a] *= share
+        for a in range(3):
+            state.positions[i, a] += dt * state.velocities[i, a]
+
+
+@kernel
+def advance(
+    state: State,
+    pairs: Pairs,
+    spare: Pairs,
+    old_rows: NDArray[np.int64],
+    tool: ToolPath,
+    site: Site,
+    laws: Laws,
+    dt: float,
+    steps: int,
+) -> tuple[Pairs, Pairs, float]:
+    """Advance all parcels by some sub-steps.
+
+    Args:
+        state: All parcels, changed in place.
+        pairs: Neighbours of the last call.
+        spare: Another list as large, whose content does not matter.
+        old_rows: (n,) row of each parcel in that call, -1 for a new one.
+        tool: The bucket; its arrays hold the poses before each sub-step and after the last.
+        site: The ground.
+        laws: Coefficients of the contacts.
+        dt: Duration of a sub-step [s].
+        steps: Number of sub-steps.
+
+    Returns:
+        The neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
+    """
+    highest = max(site.heights.max(), site.level_z)
+    if site.box[3] > 0.0:
+        highest = max(highest, site.box[2] + site.box_heights.max())
+    new = find_pairs(state.positions, state.radii, state.asleep, pairs, old_rows, spare)
+    pairs, spare = new, pairs
+    same_rows = np.arange(len(state.masses))
+    walls = len(tool.profile) + 1
+    hit = 0.0
+    for step in range(steps):
+        if tool.present:
+            _carry(state, tool, step)
+        if is_outdated(state.positions, state.radii, pairs.anchors):
+            new = find_pairs(state.positions, state.radii, state.asleep, pairs, same_rows, spare)
+            pairs, spare = new, pairs
+        state.forces[:] = 0.0
+        state.torques[:] = 0.0
+        hit = max(hit, press_pairs(state, pairs, laws.parcel, dt))
+        if tool.present:
+            press_bucket(state, step, tool, site.grid[2], laws.steel, dt)
+        press_ground(state, site, highest, laws.ground, dt)
+        if site.box[3] > 0.0:
+            press_box(state, walls, site.box, laws.steel, dt)
+        _integrate(state, dt)
+    if tool.present:
+        _carry(state, tool, steps)
+    else:
+        state.shell[:] = OFF_BUCKET
+    return pairs, spare, hit

@@ -1,0 +1,126 @@
+"""Contact of parcels with the ground: the soil of the dig area, that in the target box, the level ground around."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.height_field import Grid, in_grid
+from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.plates import BoxNumbers, to_box
+from lerobot_excav.envs.soil.parcels.store import (
+    SHELTERED,
+    TOUCHES_BOX_FLOOR,
+    TOUCHES_GROUND,
+    TOUCHES_NOTHING,
+    TOUCHES_OUTSIDE,
+    State,
+)
+
+Array = NDArray[np.float64]
+
+LEAST_GAP = 0.3
+"""Share of its radius to which a parcel's centre may come near to the ground: ground that rises below it when others
+merge lifts it without speed."""
+
+LIFT = 0.05
+"""Share of the radius by which a parcel is lifted per sub-step at most (tuned: no visible jump)."""
+
+
+class Site(NamedTuple):
+    """What parcels can land on; z counts from the rigid floor.
+
+    Attributes:
+        heights: (nx, ny) of the dig area [m].
+        grid: Its first cell centre and cell sizes.
+        box_heights: (mx, my) of the soil in the target box above its floor [m].
+        box_grid: Its grid, in the plane of the box.
+        box: The box.
+        level_z: Height of the ground around the dig area [m].
+    """
+
+    heights: Array
+    grid: Grid
+    box_heights: Array
+    box_grid: Grid
+    box: BoxNumbers
+    level_z: float
+
+
+@kernel
+def _surface(heights: Array, grid: Grid, x: float, y: float) -> tuple[float, float, float]:
+    """Return height and slopes of the bilinear surface through the cell centres; level beyond the outer ones."""
+    nx, ny = heights.shape
+    u = min(max((x - grid[0]) / grid[2], 0.0), nx - 1.0)
+    v = min(max((y - grid[1]) / grid[3], 0.0), ny - 1.0)
+    i, j = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0))
+    k, m = min(i + 1, nx - 1), min(j + 1, ny - 1)
+    a, b = u - i, v - j
+    along_x = (heights[k, j] - heights[i, j]) * (1.0 - b) + (heights[k, m] - heights[i, m]) * b
+    along_y = (heights[i, m] - heights[i, j]) * (1.0 - a) + (heights[k, m] - heights[k, j]) * a
+    height = (heights[i, j] * (1.0 - b) + heights[i, m] * b) + a * along_x
+    return height, along_x / grid[2], along_y / grid[3]
+
+
+@kernel
+def ground_below(site: Site, x: float, y: float) -> tuple[int, float, Vector]:
+    """Return what lies below a point, its height there [m] and its unit normal."""
+    u, v = to_box(site.box, x, y)
+    if abs(u) < site.box[3] and abs(v) < site.box[4]:
+        h, su, sv = _surface(site.box_heights, site.box_grid, u, v)
+        place, h = TOUCHES_BOX_FLOOR, h + site.box[2]
+        sx, sy = site.box[6] * su - site.box[7] * sv, site.box[7] * su + site.box[6] * sv
+    elif in_grid(site.heights, site.grid, x, y):
+        h, sx, sy = _surface(site.heights, site.grid, x, y)
+        place = TOUCHES_GROUND
+    else:
+        place, h, sx, sy = TOUCHES_OUTSIDE, site.level_z, 0.0, 0.0
+    length = math.sqrt(1.0 + sx * sx + sy * sy)
+    return place, h, (-sx / length, -sy / length, 1.0 / length)
+
+
+@kernel
+def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) -> None:
+    """Add the forces of the ground on the awake parcels and note what each touches.
+
+    Deep inside the bucket there is no ground: the height field, one height per column, would leak in through the
+    shell.
+
+    Args:
+        state: All parcels, changed in place.
+        site: The ground.
+        highest: No ground is higher [m].
+        law: Coefficients of the contact with the ground.
+        dt: Duration [s].
+    """
+    positions, velocities, spins = state.positions, state.velocities, state.spins
+    springs = state.ground_springs
+    for i in range(len(state.masses)):
+        r = state.radii[i]
+        touched = state.ground[i]
+        state.ground[i] = TOUCHES_NOTHING
+        if state.asleep[i] or state.shell[i] == SHELTERED or positions[i, 2] > highest + r:
+            if touched != TOUCHES_NOTHING:
+                forget(springs, i)
+            continue
+        place, height, normal = ground_below(site, positions[i, 0], positions[i, 1])
+        gap = (positions[i, 2] - height) * normal[2]  # distance from the tangent plane
+        if gap >= r:
+            if touched != TOUCHES_NOTHING:
+                forget(springs, i)
+            continue
+        state.ground[i] = place
+        if gap < LEAST_GAP * r:
+            lift = min(LEAST_GAP * r - gap, LIFT * r)
+            for a in range(3):
+                positions[i, a] += lift * normal[a]
+        velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
+        spin = (spins[i, 0], spins[i, 1], spins[i, 2])
+        force, torque = wall_contact(
+            springs, i, normal, min(max(gap, 0.0), r), velocity, spin, state.masses[i], r, law, dt
+        )
+        for a in range(3):
+            state.forces[i, a] += force[a]
+            state.torques[i, a] += torque[a]

@@ -1,0 +1,147 @@
+"""The load of the bucket: which parcels belong to it, and when they rest in it as one body."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.cutting import to_tool
+from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
+from lerobot_excav.envs.soil.parcels.contact import cross
+from lerobot_excav.envs.soil.parcels.dynamics import WAKING_SPEED_M_S
+from lerobot_excav.envs.soil.parcels.plates import ToolPath, inside_depth
+from lerobot_excav.envs.soil.parcels.store import TOUCHES_NOTHING, State
+
+Array = NDArray[np.float64]
+
+LARGEST_HEAP_M = 0.35
+"""Parcels up to this far above an opening that looks up belong to the load (guess: half the opening, 45 degrees)."""
+
+_LOOKS_UP = 0.3
+_LEAVING_M_S = 1.0
+
+RESTING_SPEED_M_S = 0.05
+"""Root mean square speed in the bucket below which a load is at rest (soil.md: 0.05 m/s)."""
+
+RESTING_TIME_S = 0.2
+"""How long it stays so before it falls asleep."""
+
+WAKING_TILT_RAD = math.radians(3.0)
+"""Change of the direction of weight, in the bucket, that wakes a load."""
+
+_ACCELERATION_TIME_S = 0.1
+"""Time constant of the measured acceleration: the machine's vibration does not wake a load (guess)."""
+
+
+@kernel
+def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
+    """Mark the parcels that lie in the bucket or in the heap above its opening.
+
+    Args:
+        state: All parcels; `load` is changed.
+        tool: The bucket; its last pose counts.
+
+    Returns:
+        Mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; 1 if that touches
+        the ground, else 0.
+    """
+    step = len(tool.positions) - 1
+    position, rotation = tool.positions[step], tool.rotations[step]
+    w = (tool.angular[0], tool.angular[1], tool.angular[2])
+    up = tool.planes[0, 0] * rotation[2, 0] + tool.planes[0, 2] * rotation[2, 2]
+    first, last = tool.profile[0], tool.profile[len(tool.profile) - 1]
+    length = math.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2)
+    mass, energy, touching = 0.0, 0.0, 0
+    for i in range(len(state.masses)):
+        if state.asleep[i]:
+            continue
+        p = (state.positions[i, 0], state.positions[i, 1], state.positions[i, 2])
+        q = to_tool(position, rotation, p[0], p[1], p[2])
+        turning = cross(w, (p[0] - position[0], p[1] - position[1], p[2] - position[2]))
+        speed = 0.0
+        for a in range(3):
+            speed += (state.velocities[i, a] - tool.linear[a] - turning[a]) ** 2
+        above = -inside_depth(tool.planes[:1], 0, q)
+        state.load[i] = 0
+        if above <= 0.0:
+            state.load[i] = 1 if inside_depth(tool.planes, 1, q) > 0.0 else 0
+        elif above < LARGEST_HEAP_M and up > _LOOKS_UP and abs(q[1]) < tool.half_width:
+            along = (q[0] - first[0]) * (last[0] - first[0]) + (q[2] - first[1]) * (last[1] - first[1])
+            over = 0.0 < along < length * length
+            state.load[i] = 1 if over and speed < _LEAVING_M_S**2 else 0
+        if state.load[i]:
+            mass += state.masses[i]
+            energy += state.masses[i] * speed
+            if state.ground[i] != TOUCHES_NOTHING:
+                touching = 1
+    return mass, energy / mass if mass > 0.0 else 0.0, touching
+
+
+def places_in(position: Array, rotation: Array, positions: Array) -> Array:
+    """Turn (n, 3) world points into the tool frame [m]."""
+    result: Array = (positions - position) @ rotation
+    return result
+
+
+class Rest:
+    """Puts the load of one bucket to sleep and wakes it.
+
+    A sleeping load is part of the bucket. It wakes when the direction of its weight, acceleration included, has
+    turned in the bucket, when the bucket cuts, and when another parcel hits it.
+    """
+
+    def __init__(self) -> None:
+        """Start with nothing known."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the bucket."""
+        self._calm_s = 0.0
+        self._velocity: Array | None = None
+        self._acceleration: Array = np.zeros(3)
+        self._weight_t: Array = np.zeros(3)
+
+    def update(self, state: State, tool: ToolPath, dt_s: float, hit_m_s: float, *, cutting: bool) -> None:
+        """Look at the load after a step.
+
+        Args:
+            state: All parcels; `load`, `asleep` and `places_t` are changed.
+            tool: The bucket in that step.
+            dt_s: Duration of the step.
+            hit_m_s: Fastest hit on a sleeping parcel.
+            cutting: Whether soil entered the bucket.
+        """
+        weight_t = self._direction_of_weight(tool, dt_s)
+        if state.asleep.any():
+            turned = math.acos(min(1.0, float(weight_t @ self._weight_t)))
+            if cutting or hit_m_s > WAKING_SPEED_M_S or turned > WAKING_TILT_RAD:
+                state.asleep[:] = 0
+                self._calm_s = 0.0
+        mass, square_speed, touching = find_load(state, tool)
+        calm = mass > 0.0 and not touching and not cutting and square_speed < RESTING_SPEED_M_S**2
+        self._calm_s = self._calm_s + dt_s if calm else 0.0
+        if self._calm_s >= RESTING_TIME_S:
+            if not state.asleep.any():
+                self._weight_t = weight_t
+            put_to_sleep(state, tool)
+            self._calm_s = 0.0
+
+    def _direction_of_weight(self, tool: ToolPath, dt_s: float) -> Array:
+        """Return the unit vector along gravity minus acceleration, in the tool frame."""
+        if self._velocity is not None:
+            share = -math.expm1(-dt_s / _ACCELERATION_TIME_S)
+            self._acceleration += share * ((tool.linear - self._velocity) / dt_s - self._acceleration)
+        self._velocity = tool.linear.copy()
+        weight = (np.array([0.0, 0.0, -GRAVITY_M_S2]) - self._acceleration) @ tool.rotations[-1]
+        length = float(np.linalg.norm(weight))
+        return np.asarray(weight / length) if length > 0.0 else np.array([0.0, 0.0, -1.0])
+
+
+def put_to_sleep(state: State, tool: ToolPath) -> None:
+    """Fix the load to the bucket where it lies."""
+    rows = np.flatnonzero((state.load == 1) & (state.asleep == 0))
+    state.places_t[rows] = places_in(tool.positions[-1], tool.rotations[-1], state.positions[rows])
+    state.asleep[rows] = 1
+    state.ground_springs[rows] = 0.0
+    state.plate_springs[rows] = 0.0

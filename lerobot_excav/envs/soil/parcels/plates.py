@@ -1,0 +1,241 @@
+"""Contact of parcels with thin plates: the shell and the sides of the bucket, the walls of the target box."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.cutting import to_tool
+from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
+
+Array = NDArray[np.float64]
+BoxNumbers = tuple[float, float, float, float, float, float, float, float]
+"""A container as kernels take it: centre x, y, floor z, half lengths, wall top z, cos and sin of its yaw."""
+
+NO_BOX: BoxNumbers = (0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 1.0, 0.0)
+
+CLOSEST = 0.25
+"""Share of its radius to which a parcel's centre may come near to a plate; there it is put back. Within one
+sub-step no parcel moves as far, so none passes through."""
+
+_HAIR_M = 1e-9
+
+
+class ToolPath(NamedTuple):
+    """The bucket during one step.
+
+    Attributes:
+        present: 1 if there is one, else 0.
+        profile: (n, 2) points from edge to lip, tool frame [m].
+        planes: (n + 2, 4) half-spaces of its inside: opening, plates, right, left.
+        half_width: Of the inside [m].
+        positions: (steps + 1, 3) origin before each sub-step and after the last [m], z above the rigid floor.
+        rotations: (steps + 1, 3, 3) the same.
+        linear: (3,) velocity of the origin [m/s].
+        angular: (3,) angular velocity [rad/s].
+    """
+
+    present: int
+    profile: Array
+    planes: Array
+    half_width: float
+    positions: Array
+    rotations: Array
+    linear: Array
+    angular: Array
+
+
+@kernel
+def turned(rotation: Array, v: Vector) -> Vector:
+    """Turn a tool vector into the world."""
+    return (
+        rotation[0, 0] * v[0] + rotation[0, 1] * v[1] + rotation[0, 2] * v[2],
+        rotation[1, 0] * v[0] + rotation[1, 1] * v[1] + rotation[1, 2] * v[2],
+        rotation[2, 0] * v[0] + rotation[2, 1] * v[1] + rotation[2, 2] * v[2],
+    )
+
+
+@kernel
+def inside_depth(planes: Array, first: int, q: Vector) -> float:
+    """Return how deep a tool point lies inside of the half-spaces from the given one on [m]; negative outside."""
+    depth = math.inf
+    for k in range(first, len(planes)):
+        depth = min(depth, planes[k, 3] - planes[k, 0] * q[0] - planes[k, 1] * q[1] - planes[k, 2] * q[2])
+    return depth
+
+
+@kernel
+def _on_segment(profile: Array, k: int, x: float, z: float) -> tuple[float, float]:
+    """Return the point of the k-th side of the closed profile that is nearest to a point."""
+    m = (k + 1) % len(profile)
+    ax, az = profile[k, 0], profile[k, 1]
+    bx, bz = profile[m, 0] - ax, profile[m, 1] - az
+    share = ((x - ax) * bx + (z - az) * bz) / (bx * bx + bz * bz)
+    share = min(max(share, 0.0), 1.0)
+    return ax + share * bx, az + share * bz
+
+
+@kernel
+def nearest_on_plate(tool: ToolPath, plate: int, q: Vector) -> Vector:
+    """Return the point of a plate nearest to a tool point.
+
+    Plates 0 to n - 2 are the shell from the edge to the lip, n - 1 and n the right and the left side.
+    """
+    sides = len(tool.profile) - 1
+    if plate < sides:
+        x, z = _on_segment(tool.profile, plate, q[0], q[2])
+        return x, min(max(q[1], -tool.half_width), tool.half_width), z
+    y = -tool.half_width if plate == sides else tool.half_width
+    x, z = q[0], q[2]
+    best = 0.0
+    for k in range(len(tool.profile)):  # plane 0 is the opening: the last side of the closed profile
+        plane = k + 1 if k < sides else 0
+        if tool.planes[plane, 0] * q[0] + tool.planes[plane, 2] * q[2] > tool.planes[plane, 3]:
+            a, b = _on_segment(tool.profile, k, q[0], q[2])
+            far = (a - q[0]) ** 2 + (b - q[2]) ** 2
+            if best == 0.0 or far < best:
+                best, x, z = far, a, b
+    return x, y, z
+
+
+@kernel
+def bucket_reach(tool: ToolPath) -> float:
+    """Return how far the bucket's corners are from its origin [m]."""
+    reach = 0.0
+    for k in range(len(tool.profile)):
+        reach = max(reach, math.sqrt(tool.profile[k, 0] ** 2 + tool.profile[k, 1] ** 2 + tool.half_width**2))
+    return reach
+
+
+@kernel
+def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
+    """Add the forces of the bucket's plates on the awake parcels, and note which touch one from outside.
+
+    Parcels deep inside are marked as sheltered (`shell` 2): there is no ground for them.
+
+    Args:
+        state: All parcels, changed in place.
+        step: Which sub-step.
+        tool: The bucket.
+        opening_margin: A parcel this far behind the opening is deep inside [m].
+        law: Coefficients of the contact with steel.
+        dt: Duration [s].
+    """
+    position, rotation = tool.positions[step], tool.rotations[step]
+    linear, planes = tool.linear, tool.planes
+    angular = (tool.angular[0], tool.angular[1], tool.angular[2])
+    positions, velocities, spins = state.positions, state.velocities, state.spins
+    plates = state.plate_springs.shape[1]
+    springs = state.plate_springs.reshape((-1, SPRINGS))
+    reach = bucket_reach(tool)
+    sides = len(tool.profile) + 1
+    for i in range(len(state.masses)):
+        state.shell[i] = OFF_BUCKET
+        if state.asleep[i]:
+            continue
+        r = state.radii[i]
+        q = to_tool(position, rotation, positions[i, 0], positions[i, 1], positions[i, 2])
+        if q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + r) ** 2:
+            continue
+        depth = inside_depth(planes, 1, q)
+        if depth > 0.0 and inside_depth(planes[:1], 0, q) > opening_margin:
+            state.shell[i] = SHELTERED
+        if depth >= r and not state.near_plate[i]:
+            continue
+        state.near_plate[i] = 0
+        for plate in range(sides):
+            row = i * plates + plate
+            n0, n1, n2, d = (
+                planes[plate + 1, 0],
+                planes[plate + 1, 1],
+                planes[plate + 1, 2],
+                planes[plate + 1, 3],
+            )
+            side = n0 * q[0] + n1 * q[1] + n2 * q[2] - d
+            if abs(side) >= r:
+                forget(springs, row)
+                continue
+            c = nearest_on_plate(tool, plate, q)
+            away_t = (q[0] - c[0], q[1] - c[1], q[2] - c[2])
+            gap = math.sqrt(away_t[0] ** 2 + away_t[1] ** 2 + away_t[2] ** 2)
+            if gap >= r or gap < _HAIR_M:
+                forget(springs, row)
+                continue
+            state.near_plate[i] = 1
+            if side > 0.0:
+                state.shell[i] = OUTSIDE_OF_SHELL
+            away = turned(rotation, away_t)
+            normal = (away[0] / gap, away[1] / gap, away[2] / gap)
+            if gap < CLOSEST * r:
+                for a in range(3):
+                    positions[i, a] += (CLOSEST * r - gap) * normal[a]
+            turning = cross(angular, turned(rotation, c))
+            velocity = (
+                velocities[i, 0] - linear[0] - turning[0],
+                velocities[i, 1] - linear[1] - turning[1],
+                velocities[i, 2] - linear[2] - turning[2],
+            )
+            spin = (spins[i, 0], spins[i, 1], spins[i, 2])
+            force, torque = wall_contact(
+                springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
+            )
+            for a in range(3):
+                state.forces[i, a] += force[a]
+                state.torques[i, a] += torque[a]
+
+
+@kernel
+def to_box(box: BoxNumbers, x: float, y: float) -> tuple[float, float]:
+    """Turn a world point into the plane of the container."""
+    a, b = x - box[0], y - box[1]
+    return box[6] * a + box[7] * b, -box[7] * a + box[6] * b
+
+
+@kernel
+def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) -> None:
+    """Add the forces of the four walls of the target box on the awake parcels.
+
+    Args:
+        state: All parcels, changed in place.
+        first: Index of the first wall among the plates.
+        box: The container.
+        law: Coefficients of the contact with steel.
+        dt: Duration [s].
+    """
+    positions, velocities, spins = state.positions, state.velocities, state.spins
+    plates = state.plate_springs.shape[1]
+    springs = state.plate_springs.reshape((-1, SPRINGS))
+    for i in range(len(state.masses)):
+        r, z = state.radii[i], positions[i, 2]
+        if state.asleep[i] or z > box[5] + r:
+            continue
+        u, v = to_box(box, positions[i, 0], positions[i, 1])
+        if abs(u) > box[3] + r or abs(v) > box[4] + r:
+            continue
+        for wall in range(4):
+            row = i * plates + first + wall
+            sign = 1.0 if wall % 2 == 0 else -1.0
+            if wall < 2:
+                cu, cv = sign * box[3], min(max(v, -box[4]), box[4])
+            else:
+                cu, cv = min(max(u, -box[3]), box[3]), sign * box[4]
+            du, dv, dz = u - cu, v - cv, z - min(z, box[5])
+            gap = math.sqrt(du * du + dv * dv + dz * dz)
+            if gap >= r or gap < _HAIR_M:
+                forget(springs, row)
+                continue
+            normal = ((box[6] * du - box[7] * dv) / gap, (box[7] * du + box[6] * dv) / gap, dz / gap)
+            if gap < CLOSEST * r:
+                for a in range(3):
+                    positions[i, a] += (CLOSEST * r - gap) * normal[a]
+            velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
+            spin = (spins[i, 0], spins[i, 1], spins[i, 2])
+            force, torque = wall_contact(
+                springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
+            )
+            for a in range(3):
+                state.forces[i, a] += force[a]
+                state.torques[i, a] += torque[a]

@@ -1,0 +1,195 @@
+"""All parcels of a soil: they join, move, carry, land and leave."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
+from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
+from lerobot_excav.envs.soil.parcels.pairs import Pairs, enlarged, room_for
+from lerobot_excav.envs.soil.parcels.plates import ToolPath
+from lerobot_excav.envs.soil.parcels.store import (
+    OUTSIDE_OF_SHELL,
+    TOUCHES_BOX_FLOOR,
+    TOUCHES_GROUND,
+    TOUCHES_NOTHING,
+    TOUCHES_OUTSIDE,
+    State,
+    copy_rows,
+    empty_state,
+    keep,
+    rows,
+)
+
+Array = NDArray[np.float64]
+
+SETTLING_SPEED_M_S = 0.4
+"""A parcel on the ground slower than this merges with it (soil.md: 0.3 to 0.5 m/s)."""
+
+SETTLING_TIME_S = 0.1
+"""How long it has to be so slow."""
+
+_FIRST_CAPACITY = 1024
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Landed:
+    """Parcels that have become ground.
+
+    Attributes:
+        points_w: (n, 2) where they lay [m].
+        masses_kg: (n,) their masses.
+        place: (n,) what they lay on, one of `store.TOUCHES_…`.
+    """
+
+    points_w: Array
+    masses_kg: Array
+    place: NDArray[np.uint8]
+
+    @property
+    def is_on_ground(self) -> NDArray[np.bool_]:
+        """Tell which lay in the dig area."""
+        return np.asarray(self.place == TOUCHES_GROUND)
+
+    @property
+    def is_in_box(self) -> NDArray[np.bool_]:
+        """Tell which lay in the target box."""
+        return np.asarray(self.place == TOUCHES_BOX_FLOOR)
+
+
+class Population:
+    """All parcels.
+
+    Args:
+        plates: Number of plates that they may touch, those of the bucket and of the box together.
+        laws: Coefficients of their contacts.
+        radius_m: Of a whole parcel.
+        mass_kg: Of a whole parcel.
+        most_awake: Bound on the awake ones; above it, a new parcel joins its nearest one instead.
+
+    Attributes:
+        state: One row per parcel; z counts from the rigid floor.
+    """
+
+    def __init__(self, plates: int, laws: Laws, radius_m: float, mass_kg: float, most_awake: int) -> None:
+        self._plates = plates
+        self._laws = laws
+        self._radius_m = radius_m
+        self._mass_kg = mass_kg
+        self._most_awake = most_awake
+        self._rest = Rest()
+        # Room to spare keeps large arrays from being allocated in every step.
+        self._all = empty_state(_FIRST_CAPACITY, plates)
+        self._pairs, self._spare = room_for(_FIRST_CAPACITY), room_for(_FIRST_CAPACITY)
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove all parcels."""
+        self.state = rows(self._all, 0)
+        self._rows: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._rest.clear()
+
+    def allow_plates(self, plates: int) -> None:
+        """Set how many plates parcels may touch; a new number clears the memory of those contacts."""
+        if plates != self._plates:
+            self._plates = plates
+            count = len(self.state.masses)
+            springs = empty_state(len(self._all.masses), plates).plate_springs
+            self._all = self._all._replace(plate_springs=springs)
+            self.state = rows(self._all, count)
+
+    @property
+    def awake_count(self) -> int:
+        """Number of parcels that are computed."""
+        return int(len(self.state.asleep) - self.state.asleep.sum())
+
+    def add(self, positions: Array, velocities: Array, masses_kg: Array) -> None:
+        """Add parcels; their radius follows from their mass.
+
+        Above the bound on awake parcels, mass and momentum join the nearest awake parcel.
+
+        Args:
+            positions: (n, 3) centres [m], z above the rigid floor.
+            velocities: (n, 3) [m/s].
+            masses_kg: (n,) masses.
+        """
+        free = max(0, self._most_awake - self.awake_count)
+        count = min(free, len(positions))
+        new = empty_state(count, self._plates)
+        new.positions[:], new.velocities[:] = positions[:count], velocities[:count]
+        new.masses[:] = masses_kg[:count]
+        self._append(new)
+        for k in range(count, len(positions)):
+            self._absorb(positions[k], velocities[k], float(masses_kg[k]))
+        self.state.radii[:] = self._radius_m * np.cbrt(self.state.masses / self._mass_kg)
+
+    def _append(self, new: State) -> None:
+        """Add rows."""
+        old, count = self.state, len(self.state.masses) + len(new.masses)
+        if count > len(self._all.masses):
+            self._all = empty_state(2 * count, self._plates)
+            copy_rows(old, self._all)
+            self._pairs = enlarged(self._pairs, len(old.masses), 2 * count)
+            self._spare = room_for(2 * count)
+        copy_rows(new, State(*(array[len(old.masses) :] for array in self._all)))
+        self.state = rows(self._all, count)
+        self._rows = np.concatenate([self._rows, np.full(len(new.masses), -1, dtype=np.int64)])
+
+    def _absorb(self, position: Array, velocity: Array, mass_kg: float) -> None:
+        """Let a new parcel join the nearest awake one; mass, momentum and centre of mass are kept."""
+        state = self.state
+        far = ((state.positions - position) ** 2).sum(axis=1)
+        far[state.asleep == 1] = np.inf
+        i = int(np.argmin(far))
+        share = mass_kg / (state.masses[i] + mass_kg)
+        state.positions[i] += share * (position - state.positions[i])
+        state.velocities[i] += share * (velocity - state.velocities[i])
+        state.masses[i] += mass_kg
+
+    def step(self, tool: ToolPath, site: Site, dt_s: float, *, cutting: bool) -> None:
+        """Move all parcels and find the load of the bucket.
+
+        Args:
+            tool: The bucket on its way.
+            site: The ground.
+            dt_s: Duration.
+            cutting: Whether soil entered the bucket.
+        """
+        if len(self.state.masses) == 0:
+            return
+        steps = len(tool.positions) - 1
+        self._pairs, self._spare, hit = advance(
+            self.state, self._pairs, self._spare, self._rows, tool, site, self._laws, dt_s / steps, steps
+        )
+        self._rows = np.arange(len(self.state.masses))
+        if tool.present:
+            self._rest.update(self.state, tool, dt_s, hit, cutting=cutting)
+
+    def freeze_load(self, tool: ToolPath) -> None:
+        """Let the load sleep in a bucket that goes away, wherever that will come back."""
+        put_to_sleep(self.state, tool)
+        self._rest.clear()
+
+    def settle(self, dt_s: float) -> Landed:
+        """Take out the parcels that have come to rest on the ground.
+
+        Outside of dig area and box they go as soon as they touch, and so does what is caught between the
+        outside of the bucket and the ground: a parcel there would push the bucket up.
+        """
+        state = self.state
+        loose = (state.load == 0) & (state.asleep == 0) & (state.ground != TOUCHES_NOTHING)
+        slow = (state.velocities**2).sum(axis=1) < SETTLING_SPEED_M_S**2
+        state.calm_s[:] = np.where(loose & slow, state.calm_s + dt_s, 0.0)
+        caught = loose & (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
+        gone = caught | (loose & (state.ground == TOUCHES_OUTSIDE)) | (state.calm_s >= SETTLING_TIME_S)
+        landed = Landed(
+            points_w=state.positions[gone, :2],
+            masses_kg=state.masses[gone],
+            place=state.ground[gone],
+        )
+        if len(landed.masses_kg):
+            self.state = rows(self._all, keep(state, (~gone).astype(np.uint8)))
+            self._rows = self._rows[~gone]
+        return landed

@@ -1,0 +1,120 @@
+"""The parcels' state: plain arrays with room to grow, one row per parcel."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil.compiled import kernel
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+
+WALLS = 4
+"""Plates of the target box."""
+
+TOUCHES_NOTHING, TOUCHES_GROUND, TOUCHES_BOX_FLOOR, TOUCHES_OUTSIDE = range(4)
+"""What a parcel lies on: the dig area, the floor (or soil) of the target box, the level ground around."""
+
+
+OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED = range(3)
+"""Where a parcel is: not touching the shell from outside, doing so, deep inside the bucket."""
+
+
+class State(NamedTuple):
+    """Arrays of all parcels in the form that kernels take; z counts from the rigid floor.
+
+    Attributes:
+        positions: (n, 3) centres [m].
+        velocities: (n, 3) [m/s].
+        spins: (n, 3) angular velocities [rad/s].
+        masses: (n,) [kg].
+        radii: (n,) [m].
+        forces: (n, 3) of the present sub-step [N].
+        torques: (n, 3) of the present sub-step [N m].
+        places_t: (n, 3) centres in the tool frame, of parcels asleep in the bucket [m].
+        calm_s: (n,) how long each has rested on the ground [s].
+        asleep: (n,) 1 if it rests in the bucket and moves with it.
+        load: (n,) 1 if it belongs to the bucket's load.
+        ground: (n,) what it touches below, one of `TOUCHES_…`.
+        shell: (n,) where it is at the bucket, one of `OFF_BUCKET`, `OUTSIDE_OF_SHELL`, `SHELTERED`.
+        near_plate: (n,) 1 if it touched a plate of the bucket when last looked at.
+        ground_springs: (n, 6) memory of the contact with the ground [m].
+        plate_springs: (n, plates, 6) memory of the contacts with plates of bucket and box [m].
+    """
+
+    positions: Array
+    velocities: Array
+    spins: Array
+    masses: Array
+    radii: Array
+    forces: Array
+    torques: Array
+    places_t: Array
+    calm_s: Array
+    asleep: Flags
+    load: Flags
+    ground: Flags
+    shell: Flags
+    near_plate: Flags
+    ground_springs: Array
+    plate_springs: Array
+
+
+def empty_state(count: int, plates: int) -> State:
+    """Return rows of zeros for a number of parcels and of plates that they may touch."""
+    vectors = [np.zeros((count, 3)) for _ in range(6)]
+    flags = [np.zeros(count, dtype=np.uint8) for _ in range(5)]
+    positions, velocities, spins, forces, torques, places = vectors
+    masses, radii, calm = (np.zeros(count) for _ in range(3))
+    return State(
+        positions,
+        velocities,
+        spins,
+        masses,
+        radii,
+        forces,
+        torques,
+        places,
+        calm,
+        *flags,
+        np.zeros((count, 6)),
+        np.zeros((count, plates, 6)),
+    )
+
+
+def rows(state: State, count: int) -> State:
+    """Return views of the first rows."""
+    return State(*(array[:count] for array in state))
+
+
+def copy_rows(source: State, target: State) -> None:
+    """Copy all rows of a state to the first rows of another one that is as large or larger."""
+    for a, b in zip(source, target, strict=True):
+        b[: len(a)] = a
+
+
+@kernel
+def keep(state: State, kept: Flags) -> int:
+    """Move the kept rows to the front, in their order; return their number."""
+    count = 0
+    for i in range(len(kept)):
+        if not kept[i]:
+            continue
+        if count < i:
+            state.positions[count] = state.positions[i]
+            state.velocities[count] = state.velocities[i]
+            state.spins[count] = state.spins[i]
+            state.masses[count] = state.masses[i]
+            state.radii[count] = state.radii[i]
+            state.places_t[count] = state.places_t[i]
+            state.calm_s[count] = state.calm_s[i]
+            state.asleep[count] = state.asleep[i]
+            state.load[count] = state.load[i]
+            state.ground[count] = state.ground[i]
+            state.shell[count] = state.shell[i]
+            state.near_plate[count] = state.near_plate[i]
+            state.ground_springs[count] = state.ground_springs[i]
+            state.plate_springs[count] = state.plate_springs[i]
+        count += 1
+    return count
