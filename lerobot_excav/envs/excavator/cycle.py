@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from lerobot_excav.envs.excavator.constants import TICK_S
+from lerobot_excav.envs.excavator.layout import distance_to_box_footprint_m
 from lerobot_excav.envs.excavator.scene import Scene
 from lerobot_excav.envs.excavator.targets import Target
 from lerobot_excav.envs.excavator.task_state import TaskMeter, TaskState
@@ -56,9 +57,14 @@ class DigCycle:
             self.target_hit = bool(self.target.contains(self._worksite.machine.cutting_edge_pos_w))
             self.onset_time_s = self._ticks * TICK_S
         dumped = state.deposited_mass_kg >= LOADING_ONSET_KG and state.bucket_mass_kg < LOADING_ONSET_KG
-        # Soil still in the air may yet fall into the box.
-        settled = dumped and self._worksite.soil.ledger_kg()["parcels"] == 0.0
+        settled = dumped and not self._soil_moves_over_box()
         self._empty_ticks = self._empty_ticks + 1 if settled else 0
+
+    def _soil_moves_over_box(self) -> bool:
+        """Tell whether loose soil above or in the box has yet to come to rest; elsewhere it can move as it likes."""
+        soil = self._worksite.soil
+        loose_w = soil.parcel_positions_w[~soil.parcel_is_load]
+        return bool((distance_to_box_footprint_m(loose_w) == 0.0).any())
 
     @property
     def is_complete(self) -> bool:

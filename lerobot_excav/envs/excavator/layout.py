@@ -16,6 +16,13 @@ TARGET_BOX = Container(
 """The box that receives the soil."""
 
 
+def distance_to_box_footprint_m(points_w: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return distances on the ground plane from points (..., 2) or (..., 3) to the target box [m]; zero above it."""
+    local = TARGET_BOX.to_local(np.asarray(points_w)[..., :2])
+    outside = np.maximum(np.abs(local) - TARGET_BOX.half_extent_m, 0.0)
+    return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
+
+
 def cylinder_from_world(point_w: NDArray[np.float64]) -> tuple[float, float, float]:
     """Express a world point in the machine's cylinder coordinates.
 

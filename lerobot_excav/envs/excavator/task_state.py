@@ -5,7 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.excavator.layout import (
+    DIG_AREA_EXTENT_M,
+    TARGET_BOX,
+    distance_to_box_footprint_m,
+)
 from lerobot_excav.envs.excavator.targets import Target
 from lerobot_excav.envs.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import Tool
@@ -86,7 +90,7 @@ class TaskMeter:
 
         Soil falls for a while before the box gains it, so a drop above the box is no spill either.
         """
-        over_box = _horizontal_distance_to_box(self._worksite.machine.cutting_edge_pos_w) == 0.0
+        over_box = bool(distance_to_box_footprint_m(self._worksite.machine.cutting_edge_pos_w) == 0.0)
         return (
             previous_bucket_kg >= SPILL_LEAST_PAYLOAD_KG
             and drop_kg >= SPILL_LEAST_DROP_KG
@@ -113,7 +117,7 @@ class TaskMeter:
 def distance_to_box_m(point_w: NDArray[np.float64]) -> float:
     """Return the distance from a point to the box with its walls [m]; zero inside or above-floor within the walls."""
     above = max(0.0, point_w[2] - TARGET_BOX.center_w[2] - TARGET_BOX.wall_height_m)
-    return float(np.hypot(_horizontal_distance_to_box(point_w), above))
+    return float(np.hypot(distance_to_box_footprint_m(point_w), above))
 
 
 def depth_below_dig_plane_m(tool: Tool) -> float:
@@ -141,11 +145,3 @@ def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rise smoothly from 0 at -1 to 1 at +1."""
     t = np.clip(0.5 * (x + 1.0), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
-
-
-def _horizontal_distance_to_box(point_w: NDArray[np.float64]) -> float:
-    """Distance on the ground plane from a point to the box's footprint [m], zero above it."""
-    offset = np.asarray(point_w[:2]) - np.asarray(TARGET_BOX.center_w[:2])
-    cos, sin = np.cos(TARGET_BOX.yaw_rad), np.sin(TARGET_BOX.yaw_rad)
-    local = np.array([offset[0] * cos + offset[1] * sin, -offset[0] * sin + offset[1] * cos])
-    return float(np.hypot(*np.maximum(np.abs(local) - np.asarray(TARGET_BOX.half_extent_m), 0.0)))

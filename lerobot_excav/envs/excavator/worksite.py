@@ -69,4 +69,4 @@ class Worksite:
     @property
     def box_mass_kg(self) -> float:
         """Soil in the target box [kg]."""
-        return self.soil.ledger_kg()["box"]
+        return self.soil.box_mass_kg
