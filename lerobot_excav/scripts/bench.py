@@ -1,7 +1,8 @@
-"""Measure this machine, or let the scripted operator play many scenes.
+"""Measure this machine, let the scripted operator play many scenes, or hold the soil to published experiments.
 
 Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like
-that of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies.
+that of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies. `bench soil` repeats published
+experiments and tells which gates they pass.
 
 Examples:
   lerobot-excav bench --quick --json=outputs/machine.json
@@ -10,6 +11,8 @@ Examples:
       100 test scenes with 4 targets each
   lerobot-excav bench operator --first-scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
+  lerobot-excav bench soil --report
+      docs/soil_validation.md and its plots; `bench soil --help` explains the experiments
 """
 
 import argparse
@@ -19,6 +22,7 @@ import platform
 from pathlib import Path
 
 from lerobot_excav.errors import require, require_choice
+from lerobot_excav.scripts import bench_soil
 from lerobot_excav.scripts.demonstration_arguments import DEFAULT_WORKERS, add_settings, settings_from
 
 MEASURES = ("soil", "environment", "writing", "demos", "policy")
@@ -38,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"processes that record (default: {DEFAULT_WORKERS})",
     )
     parser.add_argument("--json", type=Path, help="also write the numbers to this file")
-    operator = parser.add_subparsers(dest="what", metavar="operator").add_parser(
+    parts = parser.add_subparsers(dest="what", metavar="operator, soil")
+    operator = parts.add_parser(
         "operator",
         help="let the scripted operator play scenes, without pictures",
         description=__doc__,
@@ -47,11 +52,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     operator.add_argument("--metrics", type=Path, required=True, help="metrics file to write; must not exist")
     operator.add_argument("--resume", action="store_true", help="continue an interrupted run, or start one")
     add_settings(operator, scene_set="test", scenes=100)
+    soil = parts.add_parser(
+        "soil",
+        help="hold the soil to published experiments",
+        description=bench_soil.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    bench_soil.add_arguments(soil)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, and print what was measured."""
-    return _machine(arguments) if arguments.what is None else _operator(arguments)
+    if arguments.what is None:
+        return _machine(arguments)
+    _require_no_machine_options(arguments)
+    return bench_soil.run(arguments) if arguments.what == "soil" else _operator(arguments)
 
 
 def _machine(arguments: argparse.Namespace) -> int:
@@ -81,7 +96,6 @@ def _operator(arguments: argparse.Namespace) -> int:
     from lerobot_excav.evaluation.report import make_report
     from lerobot_excav.evaluation.report_text import report_text
 
-    _require_no_machine_options(arguments)
     evaluate_operator(
         settings_from(arguments), arguments.metrics, workers=arguments.workers, resume=arguments.resume
     )
@@ -92,15 +106,16 @@ def _operator(arguments: argparse.Namespace) -> int:
 
 
 def _require_no_machine_options(arguments: argparse.Namespace) -> None:
+    """Refuse options that stand before the name of a part and would be lost there."""
     given = {
         "--quick": arguments.quick,
         "--only": arguments.only is not None,
         "--json": arguments.json is not None,
+        "--workers": arguments.recording_workers is not None,
     }
     for option, is_given in given.items():
-        require(not is_given, f"{option} has no effect on `bench operator`; leave it out")
-    require(
-        arguments.recording_workers is None,
-        "--workers before `operator` has no effect on it; write it behind: "
-        f"bench operator --workers={arguments.recording_workers}",
-    )
+        require(
+            not is_given,
+            f"{option} before `{arguments.what}` has no effect on it; if it knows the option, write it behind, "
+            "otherwise leave it out",
+        )

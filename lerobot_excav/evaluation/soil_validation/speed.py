@@ -1,0 +1,125 @@
+"""T14: how long a step of 0.02 s takes on one core of this machine."""
+
+import os
+import platform
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.soil import Soil, Tool
+from lerobot_excav.envs.soil.benchmark import TICK_S, dig_cycle
+from lerobot_excav.evaluation.soil_validation.arrangement import cylinder
+from lerobot_excav.evaluation.soil_validation.dig_runs import prepared_soil
+from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
+from lerobot_excav.evaluation.soil_validation.results import Check, Curve, Plot, Result, Table
+
+Array = NDArray[np.float64]
+
+CARRY_TICKS = slice(350, 500)
+"""The bucket is lifted and swung to the box."""
+
+MANY_PARCELS = 1000
+"""Load of the gate of a single step."""
+
+_FALL_TICKS = 40
+"""A column of parcels falls apart; all of them move and touch."""
+
+
+def run(conditions: Conditions) -> Result:
+    """Time a dig cycle and the first moments of a falling column."""
+    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
+    _cycle(soil)  # compiles or loads the kernels
+    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
+    times, awake = _cycle(soil)
+    crowd, crowd_awake = _crowd(conditions)
+    carry = times[CARRY_TICKS]
+    return Result(
+        checks=(
+            Check(
+                name="real time over the mean step",
+                value=1e3 * TICK_S / float(times.mean()),
+                unit="×",
+                low=10.0,
+            ),
+            Check(name="95 % of the steps of a cycle", value=_percentile(times, 95), unit="ms", high=10.0),
+            Check(name="half of the steps while carrying", value=_percentile(carry, 50), unit="ms", high=1.0),
+            Check(
+                name=f"95 % of the steps with {crowd_awake:.0f} awake parcels",
+                value=_percentile(crowd, 95),
+                unit="ms",
+                high=10.0,
+            ),
+        ),
+        tables=(_table({"cycle": times, "carrying": carry, f"{crowd_awake:.0f} awake parcels": crowd}),),
+        plots=(_plot(times, awake),),
+        remarks=(
+            f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one thread computes.",
+        ),
+    )
+
+
+def _percentile(values: Array, percent: float) -> float:
+    return float(np.percentile(values, percent))
+
+
+def _timed_step(soil: Soil, tool: Tool | None) -> float:
+    start = time.perf_counter()
+    soil.step(TICK_S, tool)
+    return 1e3 * (time.perf_counter() - start)
+
+
+def _cycle(soil: Soil) -> tuple[Array, Array]:
+    """Return the time [ms] of every step of the dig cycle, and how many parcels were awake after it."""
+    times, awake = [], []
+    for tool in dig_cycle():
+        times.append(_timed_step(soil, tool))
+        awake.append(soil.awake_parcel_count)
+    return np.array(times), np.array(awake, dtype=np.float64)
+
+
+def _crowd(conditions: Conditions) -> tuple[Array, float]:
+    """Return the times [ms] of the first steps of a column of parcels, and the mean number of those awake."""
+    soil = Soil(conditions.preset, (6.0, 6.0), 0.05, conditions.fidelity, conditions.seeds[0])
+    rng = np.random.default_rng(conditions.seeds[0])
+    points = cylinder(0.45, 1.2, soil, rng)[:MANY_PARCELS]
+    soil.add_parcels(points, np.zeros_like(points))
+    times, awake = [], []
+    for _ in range(_FALL_TICKS):
+        times.append(_timed_step(soil, None))
+        awake.append(soil.awake_parcel_count)
+    return np.array(times), float(np.mean(awake))
+
+
+def _table(times: dict[str, Array]) -> Table:
+    rows = [
+        (name, float(t.mean()), _percentile(t, 50), _percentile(t, 95), float(t.max()))
+        for name, t in times.items()
+    ]
+    return Table(header=("steps", "mean [ms]", "50 % [ms]", "95 % [ms]", "worst [ms]"), rows=tuple(rows))
+
+
+def _plot(times: Array, awake: Array) -> Plot:
+    seconds = tuple(float(v) for v in TICK_S * np.arange(1, len(times) + 1))
+    return Plot(
+        name="step_times",
+        title="Step times of a dig cycle",
+        x_label="time in the cycle [s]",
+        y_label="computing time [ms]; awake parcels / 100",
+        curves=(
+            Curve(label="computing time of a step [ms]", x=seconds, y=tuple(map(float, times)), style="line"),
+            Curve(label="awake parcels / 100", x=seconds, y=tuple(map(float, awake / 100.0)), style="line"),
+        ),
+    )
+
+
+EXPERIMENT = Experiment(
+    code="T14",
+    title="Speed",
+    source="Needs of training and of a person at the controls",
+    measures="Wall time of every step of a dig cycle, and of a falling column of 1000 parcels.",
+    gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
+    "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
+    run=run,
+    is_timed=True,
+)
