@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.control import checked_action
 from lerobot_excav.envs.excavator.cycle import DigCycle
-from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
+from lerobot_excav.envs.excavator.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import Scene, draw_scene
 from lerobot_excav.envs.excavator.targets import Target, target_mask_img
@@ -128,6 +128,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         self._renderer: WorksiteRenderer | None = None
         self._cycle: DigCycle | None = None
         self._frame = 0
+        self._main_img: NDArray[np.uint8] | None = None
+        self._main_img_time_s = 0.0
 
     @property
     def worksite(self) -> Worksite:
@@ -176,7 +178,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         """Start an episode; see the class for how seed and options select scene and target.
 
         Args:
-            seed: Also seeds the corruption of the mask.
+            seed: Selects scene and target. A corrupted mask depends on these alone.
             options: May hold `scene_id` and `target_id`, and LeRobot's own keys, which begin with `lerobot_`.
 
         Returns:
@@ -190,7 +192,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         scene = draw_scene(self.scene_set, scene_id, soil=self.soil_name)
         self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
-        self._frame = 0
+        self._frame, self._main_img = 0, None
         if self.obs_type == "pixels_agent_pos":
             self._mask_img = self._draw_mask(scene, target_id)
         return self._observe(), self._info()
@@ -222,7 +224,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         """Return the main view (H, W, 3) uint8, or None without a render mode."""
         if self.render_mode is None:
             return None
-        return self.renderer.render("main", self.worksite.soil)
+        return self._draw_main()
 
     def depth_m(self) -> NDArray[np.float32]:
         """Return the depth image registered with `main` [m along the optical axis], shape (H, W), float32."""
@@ -232,7 +234,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         """Free the graphics context."""
         if self._renderer is not None:
             self._renderer.close()
-            self._renderer = None
+            self._renderer = self._main_img = None
 
     def _select(self, seed: int | None, options: dict[str, Any]) -> tuple[int, int]:
         """Choose scene and target from options, else seed, else by chance."""
@@ -249,7 +251,15 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     def _draw_mask(self, scene: Scene, target_id: int) -> NDArray[np.uint8]:
         points_w = self.renderer.terrain_points_w(self.worksite.soil)
         masks = [target_mask_img(target, points_w) for target in scene.targets]
-        return conditioned_mask(masks, target_id, self.mask_condition, self.np_random)
+        rng = corruption_rng(scene.scene_set, scene.scene_id, target_id)
+        return conditioned_mask(masks, target_id, self.mask_condition, rng)
+
+    def _draw_main(self) -> NDArray[np.uint8]:
+        """Draw the main view, or repeat it if the worksite has not moved since: LeRobot's videos ask for it again."""
+        if self._main_img is None or self._main_img_time_s != self.worksite.time_s:
+            self._main_img = self.renderer.render("main", self.worksite.soil)
+            self._main_img_time_s = self.worksite.time_s
+        return self._main_img.copy()
 
     def _observe(self) -> dict[str, Any]:
         machine = self.worksite.machine
@@ -259,7 +269,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         if self.obs_type == "pixels_agent_pos":
             soil = self.worksite.soil
             observation["pixels"] = {
-                "main": self.renderer.render("main", soil),
+                "main": self._draw_main(),
                 "cab": self.renderer.render("cab", soil),
                 "target_mask": self._mask_img.copy(),
             }

@@ -5,10 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.settings import MASK_CONDITIONS
+from lerobot_excav.envs.settings import MASK_CONDITIONS, SCENE_SETS
 from lerobot_excav.errors import ExcavError, require_choice
 
 _SHIFT_TRIES = 1000
+_STREAM = 0x3A5C  # names this family of random streams
+
+
+def corruption_rng(scene_set: str, scene_id: int, target_id: int) -> np.random.Generator:
+    """Return the generator of a corrupted mask: the same scene and target are always shown the same corruption."""
+    key = (SCENE_SETS.index(scene_set), scene_id, target_id)
+    return np.random.default_rng(np.random.SeedSequence(_STREAM, spawn_key=key))
 
 
 def conditioned_mask(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.excavator.mask_condition import conditioned_mask
+from lerobot_excav.envs.excavator.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.settings import MASK_CONDITIONS
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
@@ -53,3 +53,12 @@ def test_target_without_a_pixel_is_refused(masks, rng, condition):
 def test_blob_too_large_to_move_says_what_to_change(rng):
     with pytest.raises(ExcavError, match="observation_height"):
         conditioned_mask([np.full((20, 20, 3), 255, dtype=np.uint8)], 0, "random", rng)
+
+
+def test_corruption_repeats_for_a_scene_and_target_and_differs_elsewhere():
+    def draw(*place):
+        return corruption_rng(*place).random(4).tolist()
+
+    places = [("train", 3, 1), ("test", 3, 1), ("train", 4, 1), ("train", 3, 2)]
+    assert draw(*places[0]) == draw(*places[0])
+    assert len({tuple(draw(*place)) for place in places}) == len(places)
