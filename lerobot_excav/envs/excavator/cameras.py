@@ -35,6 +35,9 @@ CAB = CameraPose(position=(0.98, 0.75, 2.0), target=(4.8, -0.05, -0.7), fovy_deg
 """Fixed to the house (swing frame, origin on the slewing ring), on a bracket above the cab's windscreen: along the boom
 down to the dig area, and over the wall of the target box to the soil in it."""
 
+SIDE = CameraPose(position=(4.0, -4.6, 3.2), target=(4.4, 0.0, 0.0), fovy_deg=44.0)
+"""Fixed to the house (swing frame): the bucket from the right, wherever it digs or dumps. For people, not policies."""
+
 
 def axes(pose: CameraPose) -> NDArray[np.float64]:
     """Return the rotation (3, 3) whose columns are the camera's right, up and backward axes."""

@@ -32,8 +32,8 @@ def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mu
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
-        `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main`, `cab` and
-        `overview`, and the skins `terrain`, `box_soil`, `load` and `grains_…` that draw the soil.
+        `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main`, `cab`,
+        `overview` and `side`, and the skins `terrain`, `box_soil`, `load` and `grains_…` that draw the soil.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "excavator"
@@ -154,6 +154,7 @@ def _add_machine(spec: mujoco.MjSpec) -> None:
     bucket.add_site(name="cutting_edge", pos=[const.BUCKET_LENGTH_M, 0.0, 0.0], group=5)
     _add_payload(bucket)
     _add_camera(house, "cab", cameras.CAB)
+    _add_camera(house, "side", cameras.SIDE)
     bodywork.dress_undercarriage(carrier)
     bodywork.dress_house(house)
     bodywork.dress_boom(boom)

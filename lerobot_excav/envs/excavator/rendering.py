@@ -13,7 +13,7 @@ from lerobot_excav.envs.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice
 
-CAMERAS = ("main", "cab", "overview")
+CAMERAS = ("main", "cab", "overview", "side")
 _MAX_GEOMS = 300
 
 
@@ -46,7 +46,7 @@ class WorksiteRenderer:
         """Return a colour picture (H, W, 3), uint8.
 
         Args:
-            camera: `main`, `cab` or `overview`.
+            camera: `main`, `cab`, `overview` or `side`.
             soil: The soil to draw.
 
         Raises:

@@ -1,5 +1,7 @@
 """Pictures of the soil: skins that follow its surface, the load in the bucket, and parcels outside of it."""
 
+from functools import cache
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -79,9 +81,14 @@ class SoilPicture:
 
 
 def _resampled(heights: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return the nearest cell's height at every vertex of a grid that spans the same rectangle."""
-    rows, columns = (
-        np.minimum((np.linspace(0.0, 1.0, n) * cells).astype(int), cells - 1)
-        for n, cells in zip(shape, heights.shape, strict=True)
-    )
-    return heights[np.ix_(rows, columns)]
+    """Return heights of cells, bilinear between their centres, at the vertices of a grid over the same rectangle."""
+    along_x, along_y = (_interpolation(cells, n) for cells, n in zip(heights.shape, shape, strict=True))
+    return np.asarray(along_x @ heights @ along_y.T)
+
+
+@cache
+def _interpolation(cells: int, vertices: int) -> NDArray[np.float64]:
+    """Return the weights (vertices, cells) of linear interpolation between the centres of cells that tile a line."""
+    centres = (np.arange(cells) + 0.5) / cells
+    points = np.linspace(0.0, 1.0, vertices)
+    return np.stack([np.interp(points, centres, unit) for unit in np.eye(cells)], axis=1)

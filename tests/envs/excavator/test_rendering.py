@@ -5,7 +5,7 @@ from lerobot_excav.envs.excavator import cameras
 from lerobot_excav.envs.excavator.appearance import Appearance
 from lerobot_excav.envs.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.excavator.rendering import CAMERAS, WorksiteRenderer
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import ConfigurationError, RenderingError
 
@@ -49,7 +49,7 @@ def ray_cast(rise_x, rise_y, base):
     return eye + depth[..., None] * rays, depth
 
 
-@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+@pytest.mark.parametrize("camera", CAMERAS)
 def test_picture_is_rgb_of_the_asked_size(renderer, soil, camera):
     picture = renderer.render(camera, soil)
     assert picture.shape == (HEIGHT, WIDTH, 3)
@@ -162,7 +162,7 @@ def test_flying_parcels_are_drawn(machine, renderer, soil):
     soil.reset(None)
 
 
-@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+@pytest.mark.parametrize("camera", CAMERAS)
 def test_the_load_is_seen_from_every_camera(machine, renderer, soil_with_parcels, heaped_load, camera):
     machine.reset(CARRYING)
     tool = machine.tool()
@@ -172,7 +172,7 @@ def test_the_load_is_seen_from_every_camera(machine, renderer, soil_with_parcels
     assert np.any(loaded != empty, axis=-1).sum() >= 10
 
 
-@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+@pytest.mark.parametrize("camera", CAMERAS)
 def test_soil_that_pours_into_the_box_is_seen_from_every_camera(
     machine, renderer, soil_with_parcels, rng, camera
 ):
@@ -183,7 +183,7 @@ def test_soil_that_pours_into_the_box_is_seen_from_every_camera(
     assert np.any(pouring != empty, axis=-1).sum() >= 10
 
 
-@pytest.mark.parametrize("camera", ["main", "cab", "overview"])
+@pytest.mark.parametrize("camera", CAMERAS)
 def test_a_heap_in_the_box_is_seen_from_every_camera(machine, renderer, soil, rng, camera):
     machine.reset(DUMPING)
     soil.reset(None)

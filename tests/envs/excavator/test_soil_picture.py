@@ -5,7 +5,7 @@ from lerobot_excav.envs.excavator.bodywork import LOOSE_SOIL_GROUP
 from lerobot_excav.envs.excavator.constants import TICK_S
 from lerobot_excav.envs.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.excavator.soil_picture import SoilPicture
+from lerobot_excav.envs.excavator.soil_picture import SoilPicture, _resampled
 from lerobot_excav.envs.soil import Soil
 
 RADIUS_M = 0.045
@@ -67,6 +67,13 @@ def test_box_skin_shows_soil_where_there_is_some(machine, picture):
     picture.update(soil)
     heights = skin(machine, "box_soil")[:, 2]
     assert 0.0 < heights.max() <= soil.container_heights_m.max() + 1e-6
+
+
+def test_resampling_keeps_a_plane():
+    heights = 0.3 * (np.arange(8)[:, None] + 0.5) / 8 + 0.2 * (np.arange(6)[None, :] + 0.5) / 6
+    x, y = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)
+    inner = _resampled(heights, (5, 4))[1:-1, 1:-1]
+    np.testing.assert_allclose(inner, (0.3 * x[:, None] + 0.2 * y)[1:-1, 1:-1], atol=1e-12)
 
 
 def test_empty_bucket_and_still_air_draw_nothing(machine, picture, soil_with_parcels):
