@@ -23,15 +23,15 @@ Array = NDArray[np.float64]
 CREEP_SPEED_M_S = 1e-5
 """Speed at which a patch gives its full force (tuned): a stalled bucket creeps by less."""
 
-_STEPS = 30
-"""Bound on Newton's steps; a dig takes some five."""
+_STEPS = 40
+"""Bound on Newton's steps; a stalled bucket with fifty patches takes some ten."""
 
 _TOLERANCE = 1e-10
 """Step at which the joint velocities have settled [rad/s]."""
 
-_HALVINGS = 30
-_ARMIJO = 1e-4
-"""Share of the predicted descent that a step must reach, and how often it is halved for that."""
+_BISECTIONS = 30
+_FLATNESS = 0.1
+"""How often a step is bisected to find the lowest point along it, and the share of the slope that may be left."""
 
 
 @kernel
@@ -88,82 +88,100 @@ def patch_rows(jacobian: Array, rotation: Array, points_t: Array, axes_t: Array)
 
 
 @kernel
-def _speed(rows: Array, k: int, axis: int, velocity: Array) -> float:
-    total = 0.0
-    for j in range(len(velocity)):
-        total += rows[k, axis, j] * velocity[j]
-    return total
-
-
-@kernel
-def _rounded(speed: float) -> float:
-    """Return h of the head of this module."""
-    if speed <= 0.0:
-        return 0.0
-    if speed < CREEP_SPEED_M_S:
-        return 0.5 * speed * speed / CREEP_SPEED_M_S
-    return speed - 0.5 * CREEP_SPEED_M_S
-
-
-@kernel
-def patch_impulses(rows: Array, limits: Array, grips: Array, velocity: Array) -> Array:
-    """Return the impulse of each patch along its axes at some joint velocities, (k, 3) [N s]."""
-    result = np.zeros((len(limits), 3))
-    for k in range(len(limits)):
-        approach = -_speed(rows, k, 0, velocity)
-        if approach > 0.0:
-            result[k, 0] = limits[k] * min(1.0, approach / CREEP_SPEED_M_S)
-        if grips[k] > 0.0:
-            first, second = _speed(rows, k, 1, velocity), _speed(rows, k, 2, velocity)
-            share = grips[k] / max(np.sqrt(first**2 + second**2), CREEP_SPEED_M_S)
-            result[k, 1], result[k, 2] = -share * first, -share * second
+def patch_speeds(rows: Array, velocity: Array) -> Array:
+    """Return the speeds of the points of the patches along their axes, (k, 3) [m/s]."""
+    count, axes, joints = rows.shape
+    result = np.zeros((count, axes))
+    for k in range(count):
+        for a in range(axes):
+            for j in range(joints):
+                result[k, a] += rows[k, a, j] * velocity[j]
     return result
 
 
 @kernel
-def _objective(
-    rows: Array, limits: Array, grips: Array, inertia: Array, free_velocity: Array, velocity: Array
-) -> float:
-    """Return what the joint velocities minimise."""
-    total = 0.0
-    for i in range(len(velocity)):
-        for j in range(len(velocity)):
-            total += 0.5 * (velocity[i] - free_velocity[i]) * inertia[i, j] * (velocity[j] - free_velocity[j])
+def patch_impulses(speeds: Array, limits: Array, grips: Array) -> Array:
+    """Return the impulse of each patch along its axes at given speeds, (k, 3) [N s]."""
+    result = np.zeros_like(speeds)
     for k in range(len(limits)):
-        total += limits[k] * _rounded(-_speed(rows, k, 0, velocity))
+        if speeds[k, 0] < 0.0:
+            result[k, 0] = limits[k] * min(1.0, -speeds[k, 0] / CREEP_SPEED_M_S)
         if grips[k] > 0.0:
-            first, second = _speed(rows, k, 1, velocity), _speed(rows, k, 2, velocity)
-            total += grips[k] * _rounded(np.sqrt(first**2 + second**2))
-    return total
+            sliding = np.sqrt(speeds[k, 1] ** 2 + speeds[k, 2] ** 2)
+            share = grips[k] / max(sliding, CREEP_SPEED_M_S)
+            result[k, 1], result[k, 2] = -share * speeds[k, 1], -share * speeds[k, 2]
+    return result
 
 
 @kernel
-def _curvature(rows: Array, limits: Array, grips: Array, inertia: Array, velocity: Array) -> Array:
-    """Return the second derivatives of `_objective` by the joint velocities."""
-    joints = len(velocity)
+def _add_outer(matrix: Array, factor: float, row: Array) -> None:
+    for i in range(len(row)):
+        for j in range(len(row)):
+            matrix[i, j] += factor * row[i] * row[j]
+
+
+@kernel
+def _curvature(rows: Array, speeds: Array, limits: Array, grips: Array, inertia: Array) -> Array:
+    """Return the second derivatives of the function by the joint velocities."""
     result = inertia.copy()
     for k in range(len(limits)):
-        approach = -_speed(rows, k, 0, velocity)
-        if 0.0 < approach < CREEP_SPEED_M_S:
-            for i in range(joints):
-                for j in range(joints):
-                    result[i, j] += limits[k] / CREEP_SPEED_M_S * rows[k, 0, i] * rows[k, 0, j]
+        if -CREEP_SPEED_M_S < speeds[k, 0] < 0.0:
+            _add_outer(result, limits[k] / CREEP_SPEED_M_S, rows[k, 0])
         if grips[k] > 0.0:
-            first, second = _speed(rows, k, 1, velocity), _speed(rows, k, 2, velocity)
+            first, second = speeds[k, 1], speeds[k, 2]
             sliding = np.sqrt(first**2 + second**2)
-            stiffness = grips[k] / max(sliding, CREEP_SPEED_M_S)
-            for i in range(joints):
-                for j in range(joints):
-                    result[i, j] += stiffness * (
-                        rows[k, 1, i] * rows[k, 1, j] + rows[k, 2, i] * rows[k, 2, j]
-                    )
-            if sliding > CREEP_SPEED_M_S:  # along the sliding, friction is at its limit and no stiffer
-                for i in range(joints):
-                    along_i = (rows[k, 1, i] * first + rows[k, 2, i] * second) / sliding
-                    for j in range(joints):
-                        along_j = (rows[k, 1, j] * first + rows[k, 2, j] * second) / sliding
-                        result[i, j] -= stiffness * along_i * along_j
+            if sliding > CREEP_SPEED_M_S:  # at its limit, friction is stiff across the sliding only
+                across = (first * rows[k, 2] - second * rows[k, 1]) / sliding
+                _add_outer(result, grips[k] / sliding, across)
+            else:
+                _add_outer(result, grips[k] / CREEP_SPEED_M_S, rows[k, 1])
+                _add_outer(result, grips[k] / CREEP_SPEED_M_S, rows[k, 2])
     return result
+
+
+@kernel
+def _rise(speeds: Array, changes: Array, share: float, limits: Array, grips: Array) -> float:
+    """Return the slope along a step, at a share of it, of the part of the function that the patches make."""
+    total = 0.0
+    for k in range(len(limits)):
+        approach = -speeds[k, 0] - share * changes[k, 0]
+        if approach > 0.0:
+            total -= limits[k] * min(1.0, approach / CREEP_SPEED_M_S) * changes[k, 0]
+        if grips[k] > 0.0:
+            first, second = speeds[k, 1] + share * changes[k, 1], speeds[k, 2] + share * changes[k, 2]
+            sliding = max(np.sqrt(first**2 + second**2), CREEP_SPEED_M_S)
+            total += grips[k] * (first * changes[k, 1] + second * changes[k, 2]) / sliding
+    return total
+
+
+@kernel
+def _lowest_share(
+    speeds: Array, changes: Array, limits: Array, grips: Array, slope: float, curvature: float
+) -> float:
+    """Return the share in (0, 1] of a step at which the function is lowest along it.
+
+    Args:
+        speeds: (k, 3) before the step [m/s].
+        changes: (k, 3) by the whole step [m/s].
+        limits: (k,) [N s].
+        grips: (k,) [N s].
+        slope: Derivative of the inertial part along the step at its start.
+        curvature: Its second derivative.
+    """
+    flat = _FLATNESS * abs(slope + _rise(speeds, changes, 0.0, limits, grips))
+    if slope + curvature + _rise(speeds, changes, 1.0, limits, grips) <= flat:
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        share = 0.5 * (low + high)
+        rise = slope + share * curvature + _rise(speeds, changes, share, limits, grips)
+        if abs(rise) <= flat:
+            break
+        if rise < 0.0:
+            low = share
+        else:
+            high = share
+    return share
 
 
 @kernel
@@ -195,25 +213,24 @@ def _passive_share(inertia: Array, free_velocity: Array, total: Array) -> float:
 def _braked_velocity(
     rows: Array, limits: Array, grips: Array, inertia: Array, free_velocity: Array, guess: Array
 ) -> Array:
-    """Return the joint velocities that minimise `_objective`, by Newton's method with bisected steps."""
+    """Return the joint velocities that minimise the function at the head of this module."""
     velocity = guess.copy()
     for _ in range(_STEPS):
-        slope = -_joint_impulse(rows, patch_impulses(rows, limits, grips, velocity))
+        speeds = patch_speeds(rows, velocity)
+        gained = np.zeros(len(velocity))
         for i in range(len(velocity)):
             for j in range(len(velocity)):
-                slope[i] += inertia[i, j] * (velocity[j] - free_velocity[j])
-        step = solved(_curvature(rows, limits, grips, inertia, velocity), -slope)
+                gained[i] += inertia[i, j] * (velocity[j] - free_velocity[j])
+        slope = gained - _joint_impulse(rows, patch_impulses(speeds, limits, grips))
+        step = solved(_curvature(rows, speeds, limits, grips, inertia), -slope)
         if np.max(np.abs(step)) < _TOLERANCE:
             break
-        start = _objective(rows, limits, grips, inertia, free_velocity, velocity)
-        descent = _ARMIJO * np.sum(slope * step)
-        share = 1.0
-        for _ in range(_HALVINGS):
-            ahead = velocity + share * step
-            if _objective(rows, limits, grips, inertia, free_velocity, ahead) <= start + share * descent:
-                break
-            share *= 0.5
-        velocity += share * step
+        curvature = 0.0
+        for i in range(len(velocity)):
+            for j in range(len(velocity)):
+                curvature += step[i] * inertia[i, j] * step[j]
+        changes = patch_speeds(rows, step)
+        velocity += step * _lowest_share(speeds, changes, limits, grips, np.sum(gained * step), curvature)
     return velocity
 
 
@@ -235,10 +252,10 @@ def braking_impulse(
     """
     smooth = np.zeros(len(limits))
     velocity = _braked_velocity(rows, limits, smooth, inertia, free_velocity, free_velocity)
-    grips = frictions * patch_impulses(rows, limits, smooth, velocity)[:, 0]
+    grips = frictions * patch_impulses(patch_speeds(rows, velocity), limits, smooth)[:, 0]
     if np.any(grips > 0.0):
         velocity = _braked_velocity(rows, limits, grips, inertia, free_velocity, velocity)
-    impulses = patch_impulses(rows, limits, grips, velocity)
+    impulses = patch_impulses(patch_speeds(rows, velocity), limits, grips)
     total = _joint_impulse(rows, impulses)
     share = _passive_share(inertia, free_velocity, total)
     return share * total, share * impulses

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator import constants as const
-from lerobot_excav.envs.excavator.braking import braking_impulse, patch_rows
+from lerobot_excav.envs.excavator.braking import braking_impulse, patch_rows, solved
 from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.envs.soil.tool import Reaction
 
@@ -39,6 +39,7 @@ class DiggingResistance:
     def reset(self) -> None:
         """Forget the reactions of the past."""
         self._limits: Array = np.zeros(0)
+        self._joint_force: Array = np.zeros(self._model.nv)
         self.force_w_n: Array = np.zeros(3)
 
     def set_reaction(self, reaction: Reaction, data: mujoco.MjData) -> None:
@@ -52,15 +53,17 @@ class DiggingResistance:
 
     def apply(self, data: mujoco.MjData) -> None:
         """Add the resistance of this substep to `qfrc_applied`; call it between `mj_step1` and `mj_step2`."""
-        self.force_w_n = np.zeros(3)
         if len(self._limits) == 0:
+            self._joint_force[:] = 0.0
+            self.force_w_n = np.zeros(3)
             return
         mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._bucket)
         rotation = data.xmat[self._bucket].reshape(3, 3)
         rows = patch_rows(self._jacobian, rotation, self._points_t, self._axes_t)
         inertia, free_vel = self._free_motion(data)
         total, impulses = braking_impulse(rows, self._limits, self._frictions, inertia, free_vel)
-        data.qfrc_applied[:] += total / const.SUBSTEP_S
+        self._joint_force = total / const.SUBSTEP_S
+        data.qfrc_applied[:] += self._joint_force
         self.force_w_n = rotation @ np.einsum("ka,kab->b", impulses, self._axes_t) / const.SUBSTEP_S
 
     def _free_motion(self, data: mujoco.MjData) -> tuple[Array, Array]:
@@ -71,14 +74,23 @@ class DiggingResistance:
         mujoco.mj_fwdActuation(self._model, data)
         forces = data.qfrc_passive + data.qfrc_actuator + data.qfrc_applied - data.qfrc_bias
         if data.nefc:
-            mujoco.mj_fwdAcceleration(self._model, data)
-            mujoco.mj_fwdConstraint(self._model, data)
-            forces += data.qfrc_constraint
+            forces += self._constraint_force(data)
         for row, unit in zip(self._inertia, self._units, strict=True):
             mujoco.mj_mulM(self._model, data, row, unit)
         is_free = np.abs(data.actuator_force) < self._torque_limit
-        self._inertia[np.diag_indices_from(self._inertia)] += is_free * self._added_inertia
-        return self._inertia, data.qvel + const.SUBSTEP_S * np.linalg.solve(self._inertia, forces)
+        self._inertia.flat[:: self._model.nv + 1] += is_free * self._added_inertia
+        return self._inertia, data.qvel + const.SUBSTEP_S * solved(self._inertia, forces)
+
+    def _constraint_force(self, data: mujoco.MjData) -> Array:
+        """Return the force of contacts and joint limits on the joints while the soil resists as it did before.
+
+        Soil and contacts share the load: each is solved in turn with the last force of the other.
+        """
+        data.qfrc_applied[:] += self._joint_force
+        mujoco.mj_fwdAcceleration(self._model, data)
+        mujoco.mj_fwdConstraint(self._model, data)
+        data.qfrc_applied[:] -= self._joint_force
+        return np.array(data.qfrc_constraint)
 
 
 def _axes(patches: Patches) -> Array:

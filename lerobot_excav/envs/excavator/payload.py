@@ -5,11 +5,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator import constants as const
+from lerobot_excav.envs.soil.compiled import kernel
 
 Array = NDArray[np.float64]
 
 # Moments of inertia of a unit mass from its radii of gyration: Ixx = ky^2 + kz^2 and so on.
 _UNIT_INERTIA_M2 = (np.ones((3, 3)) - np.eye(3)) @ np.array(const.PAYLOAD_GYRATION_M) ** 2
+
+
+@kernel
+def momentum_taken(
+    jacobian: Array,
+    rotation: Array,
+    joint_vel: Array,
+    com_t: Array,
+    com_before_t: Array,
+    mass_kg: float,
+    kept_kg: float,
+) -> Array:
+    """Return the momentum that the joints give to soil that joins the bucket or shifts in it, (n,) [N m s].
+
+    Args:
+        jacobian: (6, n) of the tool origin: linear, then angular velocity in the world.
+        rotation: (3, 3) of the tool.
+        joint_vel: (n,) [rad/s].
+        com_t: (3,) where the payload is now [m].
+        com_before_t: (3,) where its old part was [m].
+        mass_kg: The payload now.
+        kept_kg: How much of it was in the bucket before, and moved with it.
+    """
+    joints = len(joint_vel)
+    velocity, spin = np.zeros(3), np.zeros(3)
+    for a in range(3):
+        for j in range(joints):
+            velocity[a] += jacobian[a, j] * joint_vel[j]
+            spin[a] += jacobian[3 + a, j] * joint_vel[j]
+    arm = np.sum(rotation * com_t, axis=1)
+    now = velocity + np.cross(spin, arm)
+    before = velocity + np.cross(spin, np.sum(rotation * com_before_t, axis=1))
+    linear = mass_kg * now - kept_kg * before
+    spin_t = np.sum(rotation.T * spin, axis=1)
+    angular = np.sum(rotation * (_UNIT_INERTIA_M2 * spin_t), axis=1) * (mass_kg - kept_kg)
+    angular += np.cross(arm, linear)
+    taken = np.zeros(joints)
+    for j in range(joints):
+        for a in range(3):
+            taken[j] += jacobian[a, j] * linear[a] + jacobian[3 + a, j] * angular[a]
+    return taken
 
 
 class Payload:
@@ -69,12 +111,10 @@ class Payload:
             return
         mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._body)
         rotation = data.xmat[self._body].reshape(3, 3)
-        linear, angular = self._jacobian[:3], self._jacobian[3:]
-        now = linear + np.cross(angular, rotation @ self._com_t, axis=0)
-        before = linear + np.cross(angular, rotation @ com_before, axis=0)
-        momentum = (self.mass_kg * now - kept_kg * before) @ data.qvel
-        spin = (self.mass_kg - kept_kg) * _UNIT_INERTIA_M2 * (rotation.T @ angular @ data.qvel)
-        data.qfrc_applied[:] -= (now.T @ momentum + angular.T @ (rotation @ spin)) / const.SUBSTEP_S
+        taken = momentum_taken(
+            self._jacobian, rotation, data.qvel, self._com_t, com_before, self.mass_kg, kept_kg
+        )
+        data.qfrc_applied[:] -= taken / const.SUBSTEP_S
 
     def _write(self) -> None:
         self._model.body_mass[self._body] = self.mass_kg

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 FULL_SHARE = 0.2
 """Share of the speed into a patch, or across it, from which on `Patches.wrench` gives the full force (guess)."""
 
-REST_SPEED_M_S = 1e-3
-"""Speed below which `Patches.wrench` fades out: numerical, far below any digging speed (guess)."""
+REST_SPEED_M_S = 0.01
+"""Speed below which `Patches.wrench` fades out (guess): far below any digging speed, above the creep at a stall."""
 
 
 class PatchKind(IntEnum):

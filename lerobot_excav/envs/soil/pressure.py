@@ -2,7 +2,9 @@
 
 An upright face finds the passive pressure of the fundamental equation of earthmoving, spread over its depth. A face
 that leans over the soil sinks into it: the pressure grows with the sinkage as Bekker measured (k z^n), up to the
-bearing capacity (Vesic 1973). In between, this counts by the square of the downward part of the normal (guess).
+bearing capacity (Vesic 1973). Where the ground falls off beside the face, as on the flanks of a pile, both are lower by
+the ground factor (1 - slope)^2 (Vesic 1975). In between, this counts by the square of the downward part of the normal
+(guess).
 
 Any pressure starts from zero at contact and is whole where the soil overlaps the outer face by the thickness of the
 plate: the cut clears the inside of the plates, so soil that touches one reaches as deep into its outer face.
@@ -29,6 +31,9 @@ SINKAGE_MODULUS = 1.53e6
 SINKAGE_EXPONENT = 1.1
 """Exponent n of the same."""
 
+FALL_REACH_M = 0.5
+"""Distance over which the fall of the ground is read (guess: about the breadth of the bucket's bottom)."""
+
 
 @kernel
 def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) -> Array:
@@ -51,9 +56,38 @@ def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) ->
 
 
 @kernel
+def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
+    """Return the share of the bearing that is left on ground that falls off towards one side, (m,).
+
+    Args:
+        heights: (nx, ny) heights [m].
+        grid: First cell centre and cell sizes.
+        points: (m, 3) where the ground bears.
+    """
+    factors = np.ones(len(points))
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        level = surface_height(heights, grid, x, y)
+        lowest = min(
+            min(
+                surface_height(heights, grid, x - FALL_REACH_M, y),
+                surface_height(heights, grid, x + FALL_REACH_M, y),
+            ),
+            min(
+                surface_height(heights, grid, x, y - FALL_REACH_M),
+                surface_height(heights, grid, x, y + FALL_REACH_M),
+            ),
+        )
+        slope = min(max((level - lowest) / FALL_REACH_M, 0.0), 1.0)
+        factors[k] = (1.0 - slope) ** 2
+    return factors
+
+
+@kernel
 def plate_limits(
     overlaps: Array,
     sinkages: Array,
+    factors: Array,
     normals: Array,
     areas: Array,
     breadths: Array,
@@ -65,6 +99,7 @@ def plate_limits(
     Args:
         overlaps: (m,) height of the soil above each sample [m].
         sinkages: (m,) way that each has gone into the soil since it met it [m].
+        factors: (m,) share of the bearing that the slope of the ground leaves.
         normals: (m, 3) unit vectors out of the bucket.
         areas: (m,) [m2].
         breadths: (m,) shares of the breadth of the footing [m].
@@ -80,7 +115,7 @@ def plate_limits(
             _, cohesion, surcharge = table_row(table, math.atan2(upright, normals[k, 2]))
             passive = (soil[0] * overlaps[k] * surcharge + soil[3] * cohesion) * math.cos(soil[2])
             capacity = soil[0] * (overlaps[k] * soil[5] + 0.5 * footing * soil[6]) + soil[3] * soil[4]
-            bearing = min(SINKAGE_MODULUS * sinkages[k] ** SINKAGE_EXPONENT, capacity)
+            bearing = factors[k] * min(SINKAGE_MODULUS * sinkages[k] ** SINKAGE_EXPONENT, capacity)
             downward = max(0.0, -normals[k, 2]) ** 2
             limits[k] = areas[k] * contacts[k] * (passive + downward * (bearing - passive))
     return limits
@@ -107,11 +142,19 @@ class PlatePressure:
         arms = faces.points_t @ tool.rotation_w.T
         normals = faces.normals_t @ tool.rotation_w.T
         points = tool.position_w + arms
-        overlaps = plate_overlaps(heights_m, grid, points + np.array([0.0, 0.0, floor_depth_m]), normals)
+        raised = points + np.array([0.0, 0.0, floor_depth_m])
+        overlaps = plate_overlaps(heights_m, grid, raised, normals)
         velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
         sunk = self._sinkages + dt_s * np.einsum("ij,ij->i", velocities, normals)
         self._sinkages = np.where(overlaps > 0.0, np.maximum(0.0, sunk), 0.0)
         limits = plate_limits(
-            overlaps, self._sinkages, normals, faces.areas_m2, faces.breadths_m, self._soil, self._table
+            overlaps,
+            self._sinkages,
+            ground_factors(heights_m, grid, raised),
+            normals,
+            faces.areas_m2,
+            faces.breadths_m,
+            self._soil,
+            self._table,
         )
         return Patches.alike(points, -normals, limits, math.tan(self._soil[2]), PatchKind.PRESSURE)

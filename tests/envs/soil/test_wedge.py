@@ -1,0 +1,119 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil import reference
+from lerobot_excav.envs.soil.earthmoving import failure_table
+from lerobot_excav.envs.soil.forces import soil_numbers
+from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.parameters import PRESETS
+from lerobot_excav.envs.soil.wedge import (
+    EDGE_THICKNESS_M,
+    PENETRATION_CAP_N,
+    edge_bearing,
+    edge_limits,
+    table_row,
+    wedge_area,
+)
+
+SAND = soil_numbers(PRESETS["sand"])
+TABLE = failure_table(PRESETS["sand"].friction_angle_rad, PRESETS["sand"].steel_friction_angle_rad)
+AHEAD = (-1.0, 0.0)
+
+
+def flat(height: float = 1.0) -> HeightField:
+    field = HeightField((120, 120), (0.05, 0.05), 0.0)
+    field.reset(np.full((120, 120), height))
+    return field
+
+
+def limits(field: HeightField, edges: np.ndarray, weighed: np.ndarray | None = None, rake_deg: float = 40.0):
+    return edge_limits(
+        field.heights,
+        field.heights if weighed is None else weighed,
+        field.grid,
+        edges,
+        math.radians(rake_deg),
+        AHEAD,
+        0.7,
+        SAND,
+        TABLE,
+    )
+
+
+@given(failure=st.floats(0.25, 0.6), slope=st.floats(-0.4, 0.2), depth=st.floats(0.05, 0.5))
+@settings(max_examples=30, deadline=None)
+def test_the_wedge_on_a_slope_is_weighed_exactly(failure: float, slope: float, depth: float) -> None:
+    field = flat()
+    field.heights[:] = (1.0 - slope * (field.centres(0)))[:, None]
+    found = wedge_area(field.heights, field.grid, (0.0, 0.0, 1.0 - depth), AHEAD, failure)
+    reach = np.arange(0.0, 2.9, 0.001)
+    expected = reference.wedge_area(depth + slope * np.maximum(reach, 0.05), 0.001, failure)
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def test_rakes_beyond_the_table_count_as_its_ends() -> None:
+    for inside, outside in ((20.0, -30.0), (75.0, 90.0), (75.0, 170.0)):
+        assert table_row(TABLE, math.radians(outside)) == pytest.approx(
+            table_row(TABLE, math.radians(inside))
+        )
+    edges = np.array([[0.0, 0.0, 0.7]])
+    assert limits(flat(), edges, rake_deg=90.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=75.0)[0])
+    assert limits(flat(), edges, rake_deg=5.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=20.0)[0])
+
+
+def test_each_slice_has_the_soil_before_it() -> None:
+    field = flat()
+    field.heights[:, 60:] += 0.2
+    wedges, bearings = limits(field, np.array([[0.0, -0.5, 0.8], [0.0, 0.5, 0.8]]))
+    assert wedges[1] > 3.0 * wedges[0] > 0.0
+    assert bearings[1] > bearings[0] > 0.0
+
+
+def test_slices_add_up_to_the_whole_edge() -> None:
+    whole = limits(flat(), np.array([[0.0, 0.0, 0.7]]))
+    parts = limits(flat(), np.array([[0.0, y, 0.7] for y in (-0.3, -0.1, 0.1, 0.3)]))
+    assert parts[0].sum() == pytest.approx(whole[0][0])
+    assert parts[1].sum() == pytest.approx(whole[1][0])
+
+
+def test_loose_soil_on_the_ground_weighs_on_the_wedge_but_does_not_bury_the_edge() -> None:
+    field = flat()
+    weighed = field.heights + 0.1
+    edges = np.array([[0.0, 0.0, 0.7]])
+    plain, loaded = limits(field, edges), limits(field, edges, weighed)
+    assert loaded[0][0] > 1.3 * plain[0][0]
+    assert loaded[1][0] == plain[1][0]
+    above = np.array([[0.0, 0.0, 1.05]])
+    assert not np.any(limits(field, above, weighed))
+
+
+def test_an_edge_outside_of_the_field_meets_nothing() -> None:
+    assert not np.any(limits(flat(), np.array([[3.5, 0.0, 0.5], [0.0, -3.2, 0.5]])))
+
+
+def test_the_bearing_starts_from_zero_and_grows() -> None:
+    depths = np.linspace(0.0, 0.6, 400)
+    found = np.array([edge_bearing(depth, 0.7, SAND) for depth in depths])
+    assert found[0] == 0.0
+    assert (np.diff(found) > 0).all()
+    assert np.diff(found).max() < 0.02 * found[-1]
+
+
+def test_the_bearing_of_the_whole_edge_is_capped() -> None:
+    strong = (*SAND[:-1], 99.0)
+    edges = np.array([[0.0, y, 0.5] for y in (-0.3, -0.1, 0.1, 0.3)])
+    field = flat()
+    bearings = edge_limits(field.heights, field.heights, field.grid, edges, 0.7, AHEAD, 0.7, strong, TABLE)[1]
+    assert bearings.sum() == pytest.approx(PENETRATION_CAP_N)
+
+
+def test_cohesion_adds_its_term_to_the_bearing() -> None:
+    sticky = (*SAND[:3], 2000.0, *SAND[4:])
+    more = edge_bearing(0.3, 0.7, sticky) - edge_bearing(0.3, 0.7, SAND)
+    area = (EDGE_THICKNESS_M + 5 * 0.06 * 0.015 / 0.7) * 0.7
+    assert more == pytest.approx(2000.0 * SAND[4] * area)
+    assert SAND[4] == pytest.approx((SAND[5] - 1.0) / math.tan(SAND[1]))
