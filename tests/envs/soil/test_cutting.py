@@ -10,8 +10,10 @@ from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
 from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose
+from lerobot_excav.envs.soil.parcels.birth import Intake
 
 CELL = 0.05
+PARCEL_RADIUS = 0.045
 PLANES = BUCKET.planes_t
 
 
@@ -32,10 +34,27 @@ def pose(edge: tuple[float, float, float], turned: np.ndarray) -> Pose:
 
 
 def move(
-    field: HeightField, before: Pose, now: Pose, room: float = 1.0, bins: int = 4
+    field: HeightField,
+    before: Pose,
+    now: Pose,
+    room: float = 1.0,
+    bins: int = 4,
+    intake: Intake | None = None,
 ) -> tuple[float, float]:
+    intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     window = field.window(now.place(BUCKET.corners_t))
-    return cut(field.heights, field.active, field.grid, PLANES, before.arrays, now.arrays, window, bins, room)
+    return cut(
+        field.heights,
+        field.active,
+        field.grid,
+        PLANES,
+        before.arrays,
+        now.arrays,
+        window,
+        bins,
+        room,
+        (intake.volumes, intake.frame),
+    )
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
@@ -87,8 +106,10 @@ def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(
 ) -> None:
     turned, field = rotation(*angles), flat(0.5)
     before, now = pose(edge, turned), pose(tuple(np.add(edge, step)), turned)
-    volume = field.volume_m3
-    entered, lost = move(field, before, now, room)
+    volume, intake = field.volume_m3, Intake(BUCKET, PARCEL_RADIUS)
+    entered, lost = move(field, before, now, room, intake=intake)
+    assert intake.waiting_m3 == pytest.approx(entered, abs=1e-12)
+    assert (intake.volumes >= 0.0).all()
     assert field.volume_m3 + entered + lost == pytest.approx(volume, abs=1e-12)
     assert 0.0 <= entered <= room
     assert (field.heights >= 0.0).all()

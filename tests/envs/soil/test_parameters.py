@@ -21,7 +21,13 @@ def test_sand_is_the_published_one() -> None:
 
 
 def test_a_parcel_of_sand_weighs_0_94_kg() -> None:
-    assert PRESETS["sand"].parcel_mass_kg == pytest.approx(0.94, abs=0.005)
+    assert PRESETS["sand"].parcel_mass_kg(0.045) == pytest.approx(0.94, abs=0.005)
+
+
+def test_packed_parcels_have_the_bulk_density_of_loosened_soil() -> None:
+    dirt, radius = PRESETS["dirt"], 0.05
+    bulk_m3 = 4.0 / 3.0 * math.pi * radius**3 / dirt.parcel_solid_fraction
+    assert dirt.parcel_mass_kg(radius) / bulk_m3 == pytest.approx(dirt.density_kg_m3 / dirt.swell)
 
 
 def test_presets_differ_from_each_other() -> None:
@@ -31,3 +37,13 @@ def test_presets_differ_from_each_other() -> None:
 def test_a_value_out_of_range_is_named() -> None:
     with pytest.raises(ConfigurationError, match=r"swell=0\.5 is out of range; allowed: 1\.0"):
         dataclasses.replace(PRESETS["sand"], swell=0.5)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["parcel_sliding_scale", "parcel_rolling_scale", "ground_sliding_scale", "ground_rolling_scale"],
+)
+@pytest.mark.parametrize("value", [-0.1, math.nan, 10.1])
+def test_friction_of_parcels_is_never_negative_and_always_a_number(name: str, value: float) -> None:
+    with pytest.raises(ConfigurationError, match=rf"{name}=.* is out of range; allowed: 0\.0 to 10\.0"):
+        dataclasses.replace(PRESETS["sand"], **{name: value})

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.benchmark import BOX, BUCKET, TICK_S, cone, dig_cycle, tool_at
+from lerobot_excav.envs.soil.benchmark import BOX, TICK_S, cone, dig_cycle, tool_at
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS
@@ -46,26 +47,29 @@ def test_reset_empties_everything_else() -> None:
     soil.reset(cone(soil))
     for tool in first_part():
         soil.step(TICK_S, tool)
-    soil.add_parcels([[-3.75, 4.75, 0.03], [9.0, 9.0, 0.03], [0.0, 0.0, 3.0]], np.zeros((3, 3)))
-    soil.step()
+    soil.add_parcels([[-3.75, 4.75, 0.04], [9.0, 9.0, 0.04], [0.0, 0.0, 3.0]], np.zeros((3, 3)))
+    for _ in range(10):
+        soil.step(TICK_S, first_part()[-1])
     assert min(soil.ledger_kg().values()) > 0.0
     soil.reset()
     assert set(soil.ledger_kg().values()) == {0.0}
-    assert len(soil.payload_surface_t) == 0
+    assert len(soil.parcel_positions_w) == soil.awake_parcel_count == 0
+    assert soil.mechanical_energy_j() == 0.0
 
 
 def test_the_same_seed_and_motion_give_the_same_bits_also_after_a_reset() -> None:
+    """Over the whole cycle: dig, carry asleep, dump, land in the box."""
     tools = list(dig_cycle())
     runs = []
-    for soil in (Soil(container=BOX, seed=3), Soil(container=BOX, seed=3)):
+    for soil in (Soil(fidelity="fast", container=BOX, seed=3), Soil(fidelity="fast", container=BOX, seed=3)):
         soil.reset(cone(soil))
         runs.append(trace(soil, tools))
     soil.reset(cone(soil))
     runs.append(trace(soil, tools))
     assert runs[0] == runs[1] == runs[2]
-    other = Soil(container=BOX, seed=4)
+    other = Soil(fidelity="fast", container=BOX, seed=4)
     other.reset(cone(other))
-    assert trace(other, tools) != runs[0]
+    assert trace(other, tools[:150]) != runs[0][:150]
 
 
 @given(
@@ -169,36 +173,36 @@ def test_height_at_is_the_world_height_of_the_ground() -> None:
     np.testing.assert_allclose(soil.height_at(points), expected, atol=1e-12)
 
 
+def lowered(tool: Tool, depth_m: float) -> Tool:
+    return dataclasses.replace(tool, position_w=tool.position_w - np.array([0.0, 0.0, depth_m]))
+
+
 def test_floor_depth_lowers_everything_and_changes_nothing_else() -> None:
-    held = []
-    for depth in (0.0, 0.4):
-        soil = Soil(floor_depth_m=depth)
+    soils = [Soil(floor_depth_m=depth) for depth in (0.0, 0.4)]
+    for soil in soils:
         soil.reset(cone(soil))
-        for tool in first_part():
-            lowered = tool.position_w - np.array([0.0, 0.0, depth])
-            soil.step(
-                TICK_S,
-                Tool(
-                    geometry=BUCKET,
-                    position_w=lowered,
-                    rotation_w=tool.rotation_w,
-                    linear_velocity_w=tool.linear_velocity_w,
-                    angular_velocity_w=tool.angular_velocity_w,
-                ),
+    for tick, tool in enumerate(first_part()):
+        for soil in soils:
+            soil.step(TICK_S, lowered(tool, soil.floor_depth_m))
+        if tick < 95:  # later, rounding has grown: colliding grains are chaotic
+            shift = np.array([0.0, 0.0, 0.4])
+            np.testing.assert_allclose(
+                soils[1].parcel_positions_w + shift, soils[0].parcel_positions_w, atol=1e-6
             )
-        held.append(soil.payload_mass_kg)
-    assert held[0] == pytest.approx(held[1], rel=1e-6)
+            np.testing.assert_allclose(soils[1].heights_m, soils[0].heights_m, atol=1e-9)
+    assert len(soils[0].parcel_positions_w) > 100
+    assert soils[1].payload_mass_kg == pytest.approx(soils[0].payload_mass_kg, rel=0.05)
 
 
 def test_swell_leaves_less_mass_in_a_full_bucket() -> None:
     full = {}
-    for preset in ("sand", "dirt"):
-        soil = Soil(preset, container=BOX)
+    for swell in (1.0, 1.2):
+        soil = Soil(dataclasses.replace(PRESETS["sand"], swell=swell))
         soil.reset(cone(soil))
-        for tool in first_part():
+        for tool in list(dig_cycle())[:200]:
             soil.step(TICK_S, tool)
-        full[preset] = soil.payload_mass_kg
-    assert full["dirt"] < 0.95 * full["sand"]
+        full[swell] = soil.payload_mass_kg
+    assert full[1.2] == pytest.approx(full[1.0] / 1.2, rel=0.06)
 
 
 @pytest.mark.parametrize("fidelity", sorted(FIDELITIES))
