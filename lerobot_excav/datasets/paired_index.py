@@ -27,7 +27,6 @@ from lerobot_excav.datasets.schema import (
     require_columns,
 )
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
-from lerobot_excav.errors import DatasetError
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
 INDEX_KEYS = (
@@ -131,18 +130,3 @@ def _with_verdicts(index: pd.DataFrame, stored: pd.DataFrame | None) -> pd.DataF
     known = stored.drop_duplicates("fingerprint").set_index("fingerprint")[["qc", "qc_problem"]]
     merged = index.join(known, on="fingerprint")
     return merged.fillna({"qc": UNCHECKED, "qc_problem": ""})
-
-
-def read_index(root: Path) -> pd.DataFrame:
-    """Read the stored index.
-
-    Raises:
-        DatasetError: There is none, or the dataset was edited since.
-    """
-    index = _stored(root)
-    hint = f"rebuild it with `lerobot-excav index {root}`"
-    if index is None:
-        raise DatasetError(f"{root} has no {INDEX_PATH}; {hint}")
-    if len(index) != read_info(root).total_episodes:
-        raise DatasetError(f"{root / INDEX_PATH} is stale: it has {len(index)} episodes; {hint}")
-    return index

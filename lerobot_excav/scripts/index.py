@@ -38,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, help="with --session: put the completed dataset here, keep the recording"
     )
+    parser.add_argument(
+        "--skip-restarted",
+        action="store_true",
+        help="with --session: leave out episodes in which the scene was restarted",
+    )
     group = parser.add_argument_group("choosing episodes for lerobot-train")
     group.add_argument("--select", choices=COMPOSITIONS, default="all", help="composition (default: all)")
     group.add_argument("--episodes", type=int, help="how many episodes (default: as many as there are)")
@@ -60,7 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.session is not None:
         from lerobot_excav.datasets.resimulation import complete_recording
 
-        root = complete_recording(root, arguments.session, out=arguments.out)
+        root = complete_recording(
+            root, arguments.session, out=arguments.out, skip_restarted=arguments.skip_restarted
+        )
     index = write_index(root)
     if not arguments.flags:
         print(f"{root / INDEX_PATH}: {len(index)} episodes")
@@ -71,7 +78,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _require_options_with_effect(arguments: argparse.Namespace) -> None:
-    require(arguments.out is None or arguments.session is not None, "--out is of use with --session only")
+    for option, given in (
+        ("--out", arguments.out is not None),
+        ("--skip-restarted", arguments.skip_restarted),
+    ):
+        require(not given or arguments.session is not None, f"{option} is of use with --session only")
     require(
         arguments.eval_fraction is None or arguments.split is not None,
         f"--eval-fraction={arguments.eval_fraction} has no effect without --split; add --split=scene",

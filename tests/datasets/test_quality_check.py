@@ -5,7 +5,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from lerobot_excav.datasets.paired_index import read_index
+from lerobot_excav.datasets.paired_index import build_index
 from lerobot_excav.datasets.provenance import PROVENANCE_PATH
 from lerobot_excav.datasets.quality_check import check_dataset
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -45,7 +45,7 @@ def test_a_sound_dataset_passes_and_the_index_says_so(paired_dataset, toy_rig, t
     shutil.copytree(paired_dataset, tmp_path / "d")
     rows = check_dataset(tmp_path / "d", replays=19, rig=toy_rig())
     assert rows["replayed"].all()
-    assert read_index(tmp_path / "d")["qc"].tolist() == ["passed"] * 19
+    assert build_index(tmp_path / "d")["qc"].tolist() == ["passed"] * 19
 
 
 def test_only_the_episodes_asked_for_are_checked(paired_dataset, toy_rig, tmp_path):
@@ -53,7 +53,7 @@ def test_only_the_episodes_asked_for_are_checked(paired_dataset, toy_rig, tmp_pa
     rows = check_dataset(tmp_path / "d", episodes=[2, 5], replays=1, rig=toy_rig())
     assert rows["episode_index"].tolist() == [2, 5]
     assert rows["replayed"].sum() == 1
-    assert read_index(tmp_path / "d")["qc"].value_counts().to_dict() == {"unchecked": 17, "passed": 2}
+    assert build_index(tmp_path / "d")["qc"].value_counts().to_dict() == {"unchecked": 17, "passed": 2}
     with pytest.raises(ConfigurationError, match=r"--episodes names \[19\]"):
         check_dataset(tmp_path / "d", episodes=[19], rig=toy_rig())
 

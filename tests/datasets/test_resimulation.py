@@ -7,7 +7,7 @@ import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
 
 from lerobot_excav.datasets import resimulation
-from lerobot_excav.datasets.paired_index import INDEX_PATH, read_index, write_index
+from lerobot_excav.datasets.paired_index import INDEX_PATH, build_index, write_index
 from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
@@ -22,7 +22,7 @@ def recording(paired_dataset, tmp_path_factory):
     remove_feature(
         dataset, list(excav_features()), output_dir=folder / "recording", repo_id="local/recording"
     )
-    index = read_index(paired_dataset)
+    index = build_index(paired_dataset)
     lines = [
         {
             "episode_index": int(row.episode_index),
@@ -69,7 +69,7 @@ def test_completing_a_recording_restores_what_the_simulation_knew(
     out = complete_recording(
         folder / "recording", folder / "session.jsonl", out=tmp_path / "c", rig=toy_rig()
     )
-    pd.testing.assert_frame_equal(read_index(out), read_index(paired_dataset))
+    pd.testing.assert_frame_equal(build_index(out), build_index(paired_dataset))
     completed = LeRobotDataset("local/c", root=out, video_backend="pyav")
     original = LeRobotDataset("local/o", root=paired_dataset, video_backend="pyav")
     for frame in (0, 7, 100):
@@ -95,7 +95,7 @@ def test_completing_in_place_replaces_the_recording(recording, toy_rig, tmp_path
     root = tmp_path / "recording"
     shutil.copytree(folder / "recording", root)
     assert complete_recording(root, folder / "session.jsonl", rig=toy_rig()) == root
-    assert len(read_index(root)) == 19
+    assert len(build_index(root)) == 19
     assert [path.name for path in tmp_path.iterdir()] == ["recording"]
 
 
@@ -103,7 +103,7 @@ def test_the_later_of_two_lines_about_an_episode_counts(recording, toy_rig, tmp_
     folder, lines = recording
     session = write_session(tmp_path / "s.jsonl", [{**lines[0], "scene_id": 4}, *lines])
     complete_recording(folder / "recording", session, out=tmp_path / "c", rig=toy_rig())
-    assert read_index(tmp_path / "c")["scene_id"][0] == 0
+    assert build_index(tmp_path / "c")["scene_id"][0] == 0
 
 
 def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
@@ -127,7 +127,7 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
         ({1: {"target_id": 2}}, r"episode 1 does not show the target mask of excavator/train/0/2"),
         ({1: {"observation_height": 64}}, r"episode 1 does not show the target mask"),
         ({1: {"simulation_version": 1}}, r"episodes 1 of version 1 of the simulation cannot be replayed"),
-        ({1: {"restarts": [3]}}, r"episode 1 was restarted at frame \[3\]"),
+        ({1: {"restarts": [3]}}, r"restarted within episode 1 at frame \[3\], .* --skip-restarted"),
         ({1: {"episode_index": 99}}, r"no line for episodes \[1\]"),
     ],
 )
@@ -135,6 +135,30 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, toy_rig, tmp
     folder, _ = recording
     with pytest.raises(DatasetError, match=message):
         complete_recording(folder / "recording", session(changes), out=tmp_path / "c", rig=toy_rig())
+
+
+def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, toy_rig, tmp_path):
+    folder, _ = recording
+    path = session({1: {"restarts": [3], "frames": 2}, 6: {"restarts": [0]}})
+    out = complete_recording(
+        folder / "recording", path, out=tmp_path / "c", skip_restarted=True, rig=toy_rig()
+    )
+    expected = build_index(paired_dataset).drop(index=[1, 6]).reset_index(drop=True)
+    expected["episode_index"] = range(17)
+    pd.testing.assert_frame_equal(build_index(out), expected)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "session.jsonl"]
+
+
+def test_a_recording_of_restarted_episodes_alone_is_refused(recording, session, toy_rig, tmp_path):
+    folder, _ = recording
+    with pytest.raises(DatasetError, match="if others remain"):
+        complete_recording(
+            folder / "recording",
+            session({index: {"restarts": [1]} for index in range(19)}),
+            out=tmp_path / "c",
+            skip_restarted=True,
+            rig=toy_rig(),
+        )
 
 
 def test_a_recording_edited_before_indexing_is_refused(recording, toy_rig, tmp_path):
@@ -153,7 +177,7 @@ def test_a_session_without_frame_counts_is_accepted(recording, toy_rig, tmp_path
     bare = [{key: value for key, value in line.items() if key != "frames"} for line in lines]
     session = write_session(tmp_path / "s.jsonl", bare)
     out = complete_recording(folder / "recording", session, out=tmp_path / "c", rig=toy_rig())
-    assert len(read_index(out)) == 19
+    assert len(build_index(out)) == 19
 
 
 def test_a_failure_while_writing_leaves_the_recording_alone(recording, toy_rig, tmp_path, monkeypatch):

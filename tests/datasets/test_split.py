@@ -9,7 +9,7 @@ from lerobot.configs.train import TrainPipelineConfig
 from lerobot.datasets import make_train_eval_datasets
 from lerobot.policies.act.configuration_act import ACTConfig
 
-from lerobot_excav.datasets.paired_index import read_index
+from lerobot_excav.datasets.paired_index import build_index
 from lerobot_excav.datasets.split import Split, split
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
@@ -64,7 +64,7 @@ def lerobot_split(root: Path, flags: list[str]) -> tuple[list[int], list[int]]:
 @pytest.mark.parametrize("unit", ["scene", "episode"])
 @pytest.mark.parametrize("fraction", [0.2, 0.37])
 def test_stock_lerobot_train_splits_as_the_flags_say(paired_dataset, unit, fraction):
-    parts = split(read_index(paired_dataset), unit, eval_fraction=fraction, seed=3)
+    parts = split(build_index(paired_dataset), unit, eval_fraction=fraction, seed=3)
     assert lerobot_split(paired_dataset, parts.flags()) == (parts.train, parts.evaluation)
 
 

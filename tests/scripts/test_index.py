@@ -2,7 +2,7 @@ import shlex
 
 import pytest
 
-from lerobot_excav.datasets.paired_index import read_index
+from lerobot_excav.datasets.paired_index import build_index
 from lerobot_excav.scripts.main import main
 
 
@@ -59,8 +59,9 @@ def test_seed_and_fraction_reach_the_split(paired_dataset, output):
     )
 
 
-def test_out_needs_a_session(paired_dataset, output, tmp_path):
+def test_out_and_skipping_need_a_session(paired_dataset, output, tmp_path):
     assert "--session only" in output(paired_dataset, f"--out={tmp_path / 'x'}")
+    assert "--session only" in output(paired_dataset, "--skip-restarted")
 
 
 @pytest.mark.parametrize(
@@ -76,6 +77,6 @@ def test_options_without_effect_are_refused(paired_dataset, output, option, mess
 
 
 def test_indexing_rewrites_the_index_only(paired_dataset, output):
-    before = read_index(paired_dataset)
+    before = build_index(paired_dataset)
     output(paired_dataset)
-    assert read_index(paired_dataset).equals(before)
+    assert build_index(paired_dataset).equals(before)

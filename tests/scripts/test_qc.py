@@ -3,7 +3,7 @@ import shutil
 import pytest
 
 from lerobot_excav.datasets import quality_check
-from lerobot_excav.datasets.paired_index import read_index, store_index
+from lerobot_excav.datasets.paired_index import build_index, store_index
 from lerobot_excav.scripts.main import main
 
 
@@ -32,7 +32,7 @@ def test_the_seed_chooses_the_replays(dataset, toy_rig, monkeypatch, capsys):
     replayed = set()
     for seed in range(4):
         main(["qc", str(dataset), "--replays=1", f"--seed={seed}"])
-        index = read_index(dataset)
+        index = build_index(dataset)
         replayed.add(int(index[index["qc"] == "failed"]["episode_index"].iloc[0]))
         store_index(dataset, index.assign(qc="unchecked", qc_problem=""))
     assert len(replayed) > 1

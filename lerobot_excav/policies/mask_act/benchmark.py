@@ -26,14 +26,12 @@ class PolicySpeed:
         name: "act", "mask_act paper" or "mask_act fast".
         parameter_count: Trainable parameters.
         training_samples_per_s: Samples through one full optimiser step per second: the median over the rounds.
-        training_samples_per_s_best: The same in the fastest round, which other work on the machine disturbs least.
         inference_ms: Median time of one plan for one environment [ms].
     """
 
     name: str
     parameter_count: int
     training_samples_per_s: float
-    training_samples_per_s_best: float
     inference_ms: float
 
 
@@ -79,7 +77,6 @@ def measure_policies(
             name=name,
             parameter_count=sum(p.numel() for p in policy.parameters() if p.requires_grad),
             training_samples_per_s=batch_size / statistics.median(training[name]),
-            training_samples_per_s_best=batch_size / min(training[name]),
             inference_ms=1e3 * statistics.median(inference[name]),
         )
         for name, policy in policies.items()

@@ -1,9 +1,7 @@
 """A gamepad as a LeRobot teleoperator of the excavator."""
 
 from collections.abc import Callable
-from typing import Any, override
-
-from lerobot.teleoperators.teleoperator import Teleoperator
+from typing import override
 
 from lerobot_excav.envs.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
@@ -11,9 +9,10 @@ from lerobot_excav.robots.excavator_sim.features import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
 from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping
+from lerobot_excav.teleoperators.excavator_teleoperator import ExcavatorTeleoperator
 
 
-class ExcavatorJoystick(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class ExcavatorJoystick(ExcavatorTeleoperator):
     """Drive the excavator with the two sticks of a gamepad.
 
     Args:
@@ -37,24 +36,9 @@ class ExcavatorJoystick(Teleoperator):  # type: ignore[misc]  # LeRobot's classe
         )
 
     @property
-    def action_features(self) -> dict[str, type]:
-        """Joystick commands in [-1, 1], as the robot takes them; the keys of the buttons are not recorded."""
-        return dict.fromkeys(ACTION_NAMES, float)
-
-    @property
-    def feedback_features(self) -> dict[str, type]:
-        """None."""
-        return {}
-
-    @property
     def is_connected(self) -> bool:
         """Whether a device is open."""
         return self._device is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: SDL calibrates gamepads."""
-        return True
 
     @override
     def connect(self, calibrate: bool = True) -> None:
@@ -76,12 +60,6 @@ class ExcavatorJoystick(Teleoperator):  # type: ignore[misc]  # LeRobot's classe
         )
         self._presses = PressDetector()
 
-    def calibrate(self) -> None:
-        """Do nothing: SDL calibrates gamepads."""
-
-    def configure(self) -> None:
-        """Do nothing: the configuration is complete when the teleoperator is made."""
-
     def get_action(self) -> dict[str, float]:
         """Return the commands of the four joints, and a key for each button that was just pressed.
 
@@ -97,9 +75,6 @@ class ExcavatorJoystick(Teleoperator):  # type: ignore[misc]  # LeRobot's classe
             if self._presses.pressed(button, is_down=buttons[button]):
                 action[key] = 1.0
         return action
-
-    def send_feedback(self, feedback: dict[str, Any]) -> None:
-        """Do nothing: the gamepad gets no feedback."""
 
     def disconnect(self) -> None:
         """Let go of the device.

@@ -4,19 +4,19 @@ It looks into the simulation of the connected robot, so it works with `--robot.t
 demonstrations are wanted faster than in real time, use `lerobot-excav demos`.
 """
 
-from typing import Any, override
+from typing import override
 
 import numpy as np
-from lerobot.teleoperators.teleoperator import Teleoperator
 
 from lerobot_excav.envs.excavator.operator import ScriptedOperator
 from lerobot_excav.envs.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
+from lerobot_excav.teleoperators.excavator_teleoperator import ExcavatorTeleoperator
 
 
-class ExcavatorOperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class ExcavatorOperator(ExcavatorTeleoperator):
     """Dig where the robot's target is, load, dump, and hold still.
 
     Starts over by itself whenever the robot's scene has been reset.
@@ -33,35 +33,14 @@ class ExcavatorOperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classe
         self._episode: tuple[int, int] | None = None
 
     @property
-    def action_features(self) -> dict[str, type]:
-        """Joystick commands in [-1, 1], as the robot takes them."""
-        return dict.fromkeys(ACTION_NAMES, float)
-
-    @property
-    def feedback_features(self) -> dict[str, type]:
-        """None."""
-        return {}
-
-    @property
     def is_connected(self) -> bool:
         """Whether `connect` has been called."""
         return self._is_connected
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: a script needs no calibration."""
-        return True
 
     @override
     def connect(self, calibrate: bool = True) -> None:
         """Get ready; the robot may connect later, as it does in `lerobot-record`."""
         self._is_connected = True
-
-    def calibrate(self) -> None:
-        """Do nothing: a script needs no calibration."""
-
-    def configure(self) -> None:
-        """Do nothing: there is nothing to configure."""
 
     def get_action(self) -> dict[str, float]:
         """Return the operator's next command; zero once the cycle is complete.
@@ -80,9 +59,6 @@ class ExcavatorOperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classe
             self._episode = episode
         command = np.zeros(len(ACTION_NAMES)) if self._operator.done else self._operator.act(robot.env)
         return dict(zip(ACTION_NAMES, np.clip(command, -1.0, 1.0).tolist(), strict=True))
-
-    def send_feedback(self, feedback: dict[str, Any]) -> None:
-        """Do nothing: a script feels nothing."""
 
     def disconnect(self) -> None:
         """Let go of the robot's simulation."""

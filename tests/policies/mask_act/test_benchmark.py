@@ -14,7 +14,7 @@ def test_speed_is_measured_for_act_and_both_presets():
     parameters = {speed.name: speed.parameter_count for speed in speeds}
     assert parameters["mask_act fast"] * 10 < parameters["act"]
     for speed in speeds:
-        assert 0 < speed.training_samples_per_s <= speed.training_samples_per_s_best
+        assert speed.training_samples_per_s > 0
         assert speed.inference_ms > 0
 
 
