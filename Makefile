@@ -7,6 +7,7 @@ UV := $(VENV)/bin/uv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 DEMO := outputs/demo
+STEPS ?= 200000
 
 # No GPU and no display are needed: pictures come from EGL. LeRobot asks no hub for anything.
 export MUJOCO_GL ?= egl
@@ -14,7 +15,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint type wheel clean
+.PHONY: help setup demo test fuzz lint type wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
@@ -41,6 +42,9 @@ demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a vi
 
 test: $(READY) ## run the test suite
 	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal
+
+fuzz: $(READY) ## 200,000 steps of random actions, the soil checked after each (STEPS=… for fewer; takes about an hour)
+	@OMP_NUM_THREADS=1 $(RUN)/lerobot-excav bench fuzz --steps=$(STEPS)
 
 lint: $(READY) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .

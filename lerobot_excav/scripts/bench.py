@@ -1,8 +1,8 @@
-"""Measure this machine, let the scripted operator play many scenes, or hold the soil to published experiments.
+"""Measure this machine, let the scripted operator play many scenes, or put the soil to the test.
 
 Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like
 that of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies. `bench soil` repeats published
-experiments and tells which gates they pass.
+experiments and tells which gates they pass; `bench fuzz` looks for impossible states after random actions.
 
 Examples:
   lerobot-excav bench --quick --json=outputs/machine.json
@@ -13,6 +13,8 @@ Examples:
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
   lerobot-excav bench soil --report
       docs/soil_validation.md and its plots; `bench soil --help` explains the experiments
+  lerobot-excav bench fuzz --steps=200000
+      random actions; `bench fuzz --help` tells what is checked
 """
 
 import argparse
@@ -22,10 +24,16 @@ import platform
 from pathlib import Path
 
 from lerobot_excav.errors import require, require_choice
-from lerobot_excav.scripts import bench_soil
+from lerobot_excav.scripts import bench_fuzz, bench_soil
 from lerobot_excav.scripts.demonstration_arguments import DEFAULT_WORKERS, add_settings, settings_from
 
 MEASURES = ("soil", "environment", "writing", "demos", "policy")
+
+_PARTS = {
+    "soil": (bench_soil, "hold the soil to published experiments"),
+    "fuzz": (bench_fuzz, "look for impossible states after random actions"),
+}
+"""Parts of `bench` with a module of their own, and what they do."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"processes that record (default: {DEFAULT_WORKERS})",
     )
     parser.add_argument("--json", type=Path, help="also write the numbers to this file")
-    parts = parser.add_subparsers(dest="what", metavar="operator, soil")
+    parts = parser.add_subparsers(dest="what", metavar="operator, soil, fuzz")
     operator = parts.add_parser(
         "operator",
         help="let the scripted operator play scenes, without pictures",
@@ -52,13 +60,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     operator.add_argument("--metrics", type=Path, required=True, help="metrics file to write; must not exist")
     operator.add_argument("--resume", action="store_true", help="continue an interrupted run, or start one")
     add_settings(operator, scene_set="test", scenes=100)
-    soil = parts.add_parser(
-        "soil",
-        help="hold the soil to published experiments",
-        description=bench_soil.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    bench_soil.add_arguments(soil)
+    for name, (command, help_text) in _PARTS.items():
+        part = parts.add_parser(
+            name,
+            help=help_text,
+            description=command.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.add_arguments(part)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.what is None:
         return _machine(arguments)
     _require_no_machine_options(arguments)
-    return bench_soil.run(arguments) if arguments.what == "soil" else _operator(arguments)
+    return _operator(arguments) if arguments.what == "operator" else _PARTS[arguments.what][0].run(arguments)
 
 
 def _machine(arguments: argparse.Namespace) -> int:
