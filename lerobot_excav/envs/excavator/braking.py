@@ -26,10 +26,10 @@ CREEP_SPEED_M_S = 1e-5
 _STEPS = 40
 """Bound on Newton's steps; a stalled bucket with fifty patches takes some ten."""
 
-_TOLERANCE = 1e-10
+_TOLERANCE = 1e-13
 """Step at which the joint velocities have settled [rad/s]."""
 
-_BISECTIONS = 30
+_BISECTIONS = 60
 _FLATNESS = 0.1
 """How often a step is bisected to find the lowest point along it, and the share of the slope that may be left."""
 

@@ -7,18 +7,24 @@ from lerobot_excav.envs.excavator.kinematics import forward, inverse
 from lerobot_excav.envs.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import Reaction
+from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.errors import ConfigurationError
 
 ZERO = np.zeros(4)
 CARRY = np.array([0.4, 0.7, -1.5, -1.8])
 
 
-def carried(mass_kg=0.0, force_w_n=(0.0, 0.0, 0.0)):
+def carried(mass_kg=0.0, push_n=0.0):
+    """A load, and soil at a fixed place that can push the bucket away from the machine."""
+    soil = Patches.alike(
+        np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]]), np.array([push_n]), 0.4, PatchKind.WEDGE
+    )
     return Reaction(
-        force_w_n=np.array(force_w_n),
+        force_w_n=np.zeros(3),
         torque_w_nm=np.zeros(3),
         payload_mass_kg=mass_kg,
         payload_com_t=np.array([0.6, 0.0, 0.2]),
+        patches=soil,
     )
 
 
@@ -113,7 +119,7 @@ def test_same_actions_give_bit_equal_motion(machine):
         machine.reset(CARRY)
         trace = []
         for action in actions:
-            machine.tick(action, carried(200.0, (2e3, 0.0, 1e3)))
+            machine.tick(action, carried(200.0, 2e3))
             trace.append(np.concatenate([machine.joint_pos, machine.joint_vel]))
         traces.append(np.array(trace))
     assert traces[0].tobytes() == traces[1].tobytes()
@@ -122,7 +128,7 @@ def test_same_actions_give_bit_equal_motion(machine):
 def test_reset_after_anything_equals_a_new_machine():
     used, new = ExcavatorMachine(container=TARGET_BOX), ExcavatorMachine(container=TARGET_BOX)
     used.reset(np.array([0.2, 0.35, -1.2, -0.6]))
-    run(used, [1.0, -1.0, 0.5, -1.0], 80, carried(485.0, (5e3, 0.0, 0.0)))
+    run(used, [1.0, -1.0, 0.5, -1.0], 80, carried(485.0, 5e3))
     for machine in (used, new):
         machine.reset(CARRY)
         run(machine, [0.5, 0.5, -0.5, 0.5], 30)
