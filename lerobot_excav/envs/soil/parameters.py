@@ -41,7 +41,7 @@ class SoilParameters:
     cohesion_pa: float
     swell: float
     steel_friction_angle_rad: float
-    parcel_solid_fraction: float = 0.60
+    parcel_solid_fraction: float = 0.56
     parcel_sliding_scale: float = 0.62
     parcel_rolling_scale: float = 0.37
     ground_sliding_scale: float = 1.2
@@ -92,7 +92,7 @@ PROVENANCE = {
         unit="rad", source="2/3 of the friction angle, McKyes 1985", kind="derived"
     ),
     "parcel_solid_fraction": Provenance(
-        unit="1", source="random packing of spheres, 0.60 to 0.64", kind="paper"
+        unit="1", source="parcels poured gently into a bucket pack to 0.56", kind="tuned"
     ),
     "parcel_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
     "parcel_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),

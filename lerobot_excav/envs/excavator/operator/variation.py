@@ -51,8 +51,8 @@ def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
         depth_m=rng.uniform(0.36, 0.46),
         attack_pitch_rad=rng.uniform(-1.75, -1.45),
         # A flat bucket holds little more than this; the curl takes the rest.
-        cut_volume_m3=rng.uniform(0.24, 0.36),
-        roll_in_pitch_rad=rng.uniform(-2.8, -2.5),
+        cut_volume_m3=rng.uniform(0.34, 0.46),
+        roll_in_pitch_rad=rng.uniform(-2.85, -2.6),
         carry_height_m=rng.uniform(1.5, 1.7),
         dump_along_m=rng.uniform(-0.15, 0.15),
         # Most pauses are short, a few are noticeable.
