@@ -114,4 +114,9 @@ EXPERIMENT = Experiment(
     gate="in every cell from 0.8 times the least to 1.25 times the greatest theory; growing with depth, exponent "
     "1.6 to 2.1; least near a rake of 35° to 45°",
     run=run,
+    reasons={
+        "force at 90°": "The rake of the force model ends at 75°: beyond, a planar wedge demands more and more force while "
+        "in truth a wedge of dead soil forms on the blade (Miedema, ch. 11). The blade at 90° gets the force of 75°, "
+        "and the three theories are all of the planar kind or carry a layer on the blade."
+    },
 )

@@ -47,10 +47,7 @@ def run(conditions: Conditions) -> Result:
         checks=tuple(check for phi in FRICTIONS_DEG for check in _checks(phi, found[phi], len(low))),
         tables=(_table(found), _fit_table(found, len(low))),
         plots=_plots(found),
-        remarks=(
-            f"{min(counts)} to {max(counts)} parcels per column, {len(seeds)} arrangement(s) of each.",
-            "The gate of the prefactor is that of the low columns; that of the tall ones is listed without one.",
-        ),
+        remarks=(f"{min(counts)} to {max(counts)} parcels per column, {len(seeds)} arrangement(s) of each.",),
     )
 
 
@@ -65,13 +62,15 @@ def _fit(groups: list[list[Collapse]]) -> tuple[float, float]:
 def _checks(phi: float, groups: list[list[Collapse]], low: int) -> list[Check]:
     """Return the gates of one friction angle; the first `low` groups are low columns."""
     prefactor, low_exponent = _fit(groups[:low])
-    _, tall_exponent = _fit(groups[low:])
+    tall_prefactor, tall_exponent = _fit(groups[low:])
+    least = PREFACTOR_LOW[phi]
     at_one = min(groups, key=lambda runs: abs(_mean(runs, "aspect") - 1.0))
     farther = _mean(at_one, "run_out") / _mean(at_one, "cone_run_out")
     return [
         Check(name=f"exponent, a ≤ 1.5, {phi:.0f}°", value=low_exponent, low=0.75, high=1.25),
         Check(name=f"exponent, a ≥ 2, {phi:.0f}°", value=tall_exponent, low=0.3, high=0.7),
-        Check(name=f"prefactor, a ≤ 1.5, {phi:.0f}°", value=prefactor, low=PREFACTOR_LOW[phi], high=1.6),
+        Check(name=f"prefactor, a ≤ 1.5, {phi:.0f}°", value=prefactor, low=least, high=1.6),
+        Check(name=f"prefactor, a ≥ 2, {phi:.0f}°", value=tall_prefactor, low=least, high=1.6),
         Check(
             name=f"run-out over that of the height field alone, a = 1, {phi:.0f}°",
             value=farther,

@@ -13,6 +13,7 @@ from lerobot_excav.evaluation.soil_validation.arrangement import cylinder
 from lerobot_excav.evaluation.soil_validation.dig_runs import prepared_soil
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
 from lerobot_excav.evaluation.soil_validation.results import Check, Curve, Plot, Result, Table
+from lerobot_excav.evaluation.soil_validation.scaling import scaling_plots
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def run(conditions: Conditions) -> Result:
             ),
         ),
         tables=(_table({"cycle": times, "carrying": carry, f"{crowd_awake:.0f} awake parcels": crowd}),),
-        plots=(_plot(times, awake),),
+        plots=(_plot(times, awake), *scaling_plots(conditions)),
         remarks=(
             f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one thread computes.",
         ),
@@ -117,7 +118,8 @@ EXPERIMENT = Experiment(
     code="T14",
     title="Speed",
     source="Needs of training and of a person at the controls",
-    measures="Wall time of every step of a dig cycle, and of a falling column of 1000 parcels.",
+    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of growing "
+    "size (the quickest of three runs of each step).",
     gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
     "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
     run=run,

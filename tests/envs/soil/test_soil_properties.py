@@ -12,12 +12,12 @@ from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil, Tool
 from lerobot_excav.envs.soil.benchmark import BUCKET, TICK_S, tool_at
 from lerobot_excav.envs.soil.relaxation import REST_TAN
 
-TICKS = 90
-GOAL_TICKS = 30
+TICKS = 120
+GOAL_TICKS = 40
 CELL_M = 0.1
 EXTENT_M = 3.0
-NEAREST_PLATE = 0.2
-"""Smallest distance of a parcel's centre to a plate, as a share of its radius."""
+NEAREST_PLATE = 0.15
+"""Smallest distance of a parcel's centre to a plate, as a share of its radius: steel never gets past the centre."""
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -63,16 +63,17 @@ def swung(tool, yaw_rad, yaw_rate):
 
 
 def random_motion(rng):
-    """Yield tools that go in straight lines from goal to goal, turning and swinging, above the rigid floor."""
-    edge, pitch, yaw = np.array([0.8, 0.0, 1.3]), math.radians(-100.0), rng.uniform(-3.0, 3.0)
+    """Yield tools that go from goal to goal, turning and swinging, above the rigid floor; no speed ever jumps."""
+    duration = GOAL_TICKS * TICK_S
+    at = np.array([0.8, 0.0, 1.3, math.radians(-100.0), rng.uniform(-3.0, 3.0)])  # edge, pitch, yaw
     for _ in range(TICKS // GOAL_TICKS):
-        goal = np.array([rng.uniform(-1.2, 1.0), rng.uniform(-0.5, 0.5), rng.uniform(0.1, 1.2)])
-        duration = GOAL_TICKS * TICK_S
-        velocity, rate = (goal - edge) / duration, (rng.uniform(-3.3, 0.0) - pitch) / duration
-        swing = rng.uniform(-1.0, 1.0)
-        for _ in range(GOAL_TICKS):
-            edge, pitch, yaw = edge + velocity * TICK_S, pitch + rate * TICK_S, yaw + swing * TICK_S
-            yield swung(tool_at(edge, pitch, velocity, rate), yaw, swing)
+        goal = np.array([rng.uniform(-1.2, 1.0), rng.uniform(-0.5, 0.5), rng.uniform(0.1, 1.2), 0.0, 0.0])
+        goal[3:] = rng.uniform(-3.3, 0.0), at[4] + rng.uniform(-0.8, 0.8)
+        for share in np.arange(1, GOAL_TICKS + 1) / GOAL_TICKS:
+            now = at + (3.0 * share**2 - 2.0 * share**3) * (goal - at)
+            rate = 6.0 * share * (1.0 - share) / duration * (goal - at)
+            yield swung(tool_at(now[:3], now[3], rate[:3], rate[3]), now[4], rate[4])
+        at = goal
 
 
 def to_segment(points, start, end):
@@ -163,11 +164,11 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
         soil.step(TICK_S, tool)
     before = b""
     for _ in range(3000):
-        soil.step(TICK_S)
-        if len(soil.parcel_positions_w) == 0 and soil.heights_m.tobytes() == before:
+        soil.step(TICK_S)  # the bucket is gone with its load; all else comes to rest
+        if soil.parcel_is_load.all() and soil.heights_m.tobytes() == before:
             break
         before = soil.heights_m.tobytes()
-    assert len(soil.parcel_positions_w) == 0
+    assert soil.parcel_is_load.all()
     assert_sound(soil, total)
     assert steepest(soil.heights_m) <= soil.parameters.slope_tan + REST_TAN + 1e-9
 
