@@ -125,8 +125,8 @@ class Bucket:
             return np.zeros((0, 3)), np.zeros(0)
         whole_kg = self._parameters.parcel_mass_kg(self._fidelity.parcel_radius_m)
         density = self._parameters.density_kg_m3
-        points = self.intake.births(whole_kg / density, rng)
-        masses = np.full(len(points), whole_kg)
+        points: Array = self.intake.births(whole_kg / density, rng)
+        masses: Array = np.full(len(points), whole_kg)
         rest_kg = self.intake.waiting_m3 * density
         if all_of_it and rest_kg > 0.0:
             self.intake.clear()

@@ -232,7 +232,7 @@ class Soil:
     @property
     def parcel_positions_w(self) -> Array:
         """(n, 3) centres of all parcels, those in the bucket included [m]: a copy."""
-        return self._loose.population.state.positions - np.array([0.0, 0.0, self.floor_depth_m])
+        return np.asarray(self._loose.population.state.positions - np.array([0.0, 0.0, self.floor_depth_m]))
 
     @property
     def parcel_velocities_w(self) -> Array:
@@ -252,12 +252,12 @@ class Soil:
     @property
     def parcel_is_load(self) -> NDArray[np.bool_]:
         """(n,) whether each parcel belongs to the load of the bucket."""
-        return self._loose.population.state.load == 1
+        return np.asarray(self._loose.population.state.load == 1)
 
     @property
     def parcel_is_asleep(self) -> NDArray[np.bool_]:
         """(n,) whether each parcel rests in the bucket and moves with it as one body."""
-        return self._loose.population.state.asleep == 1
+        return np.asarray(self._loose.population.state.asleep == 1)
 
     @property
     def awake_parcel_count(self) -> int:

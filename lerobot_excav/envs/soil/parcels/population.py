@@ -131,9 +131,9 @@ class Population:
         if count > len(self._all.masses):
             self._all = empty_state(2 * count, self._plates)
             copy_rows(old, self._all)
-            self._pairs = enlarged(self._pairs, len(old.masses), 2 * count)
+            self._pairs = enlarged(self._pairs, 2 * count)
             self._spare = room_for(2 * count)
-        copy_rows(new, State(*(array[len(old.masses) :] for array in self._all)))
+        copy_rows(new, State._make(array[len(old.masses) :] for array in self._all))
         self.state = rows(self._all, count)
         self._rows = np.concatenate([self._rows, np.full(len(new.masses), -1, dtype=np.int64)])
 

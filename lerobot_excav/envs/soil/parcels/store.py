@@ -1,6 +1,6 @@
 """The parcels' state: plain arrays with room to grow, one row per parcel."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,35 +63,36 @@ class State(NamedTuple):
 
 def empty_state(count: int, plates: int) -> State:
     """Return rows of zeros for a number of parcels and of plates that they may touch."""
-    vectors = [np.zeros((count, 3)) for _ in range(6)]
-    flags = [np.zeros(count, dtype=np.uint8) for _ in range(5)]
-    positions, velocities, spins, forces, torques, places = vectors
-    masses, radii, calm = (np.zeros(count) for _ in range(3))
     return State(
-        positions,
-        velocities,
-        spins,
-        masses,
-        radii,
-        forces,
-        torques,
-        places,
-        calm,
-        *flags,
-        np.zeros((count, 6)),
-        np.zeros((count, plates, 6)),
+        positions=np.zeros((count, 3)),
+        velocities=np.zeros((count, 3)),
+        spins=np.zeros((count, 3)),
+        masses=np.zeros(count),
+        radii=np.zeros(count),
+        forces=np.zeros((count, 3)),
+        torques=np.zeros((count, 3)),
+        places_t=np.zeros((count, 3)),
+        calm_s=np.zeros(count),
+        asleep=np.zeros(count, dtype=np.uint8),
+        load=np.zeros(count, dtype=np.uint8),
+        ground=np.zeros(count, dtype=np.uint8),
+        shell=np.zeros(count, dtype=np.uint8),
+        near_plate=np.zeros(count, dtype=np.uint8),
+        ground_springs=np.zeros((count, 6)),
+        plate_springs=np.zeros((count, plates, 6)),
     )
 
 
 def rows(state: State, count: int) -> State:
     """Return views of the first rows."""
-    return State(*(array[:count] for array in state))
+    return State._make(array[:count] for array in state)
 
 
 def copy_rows(source: State, target: State) -> None:
     """Copy all rows of a state to the first rows of another one that is as large or larger."""
-    for a, b in zip(source, target, strict=True):
-        b[: len(a)] = a
+    arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(source, target, strict=True))
+    for old, new in arrays:
+        new[: len(old)] = old
 
 
 @kernel
