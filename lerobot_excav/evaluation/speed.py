@@ -10,6 +10,19 @@ from typing import Any
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.rig import ExcavatorRig
 from lerobot_excav.datasets.simulation import play_demonstration
+from lerobot_excav.envs.settings import FIDELITIES
+
+_SOIL_NUMBERS = (
+    ("", "real_time_factor", "x real time"),
+    (", half of the ticks", "p50_ms", "ms"),
+    (", 95 % of the ticks", "p95_ms", "ms"),
+    (", worst tick", "worst_ms", "ms"),
+    (", parcels (mean)", "mean_parcels", ""),
+    (", parcels (most)", "most_parcels", ""),
+    (", awake (mean)", "mean_awake", ""),
+    (", awake (most)", "most_awake", ""),
+)
+"""What is shown of `real_time_factor`: name, key, unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,14 +45,18 @@ class Measurement:
 
 
 def measure_soil(*, quick: bool) -> list[Measurement]:
-    """Measure the soil alone over a scripted dig cycle."""
+    """Measure the soil alone over a scripted dig cycle, in every fidelity; of several runs the quickest counts."""
     from lerobot_excav.envs.soil.benchmark import real_time_factor
 
-    runs = [real_time_factor(seed) for seed in range(1 if quick else 3)]
-    return [
-        Measurement(name="soil alone", value=max(r["real_time_factor"] for r in runs), unit="x real time"),
-        Measurement(name="soil, worst tick", value=min(r["worst_ms"] for r in runs), unit="ms"),
-    ]
+    results = []
+    for fidelity in ("standard",) if quick else FIDELITIES:
+        runs = [real_time_factor(seed, fidelity) for seed in range(1 if quick else 3)]
+        best = max(runs, key=lambda run: run["real_time_factor"])
+        results += [
+            Measurement(name=f"soil alone, {fidelity}{what}", value=best[key], unit=unit)
+            for what, key, unit in _SOIL_NUMBERS
+        ]
+    return results
 
 
 def measure_environment(*, quick: bool) -> list[Measurement]:
@@ -90,11 +107,11 @@ def measure_writing(*, quick: bool) -> list[Measurement]:
         dataset = create_dataset(
             Path(folder) / "dataset", fps=settings.fps, height=settings.height, width=settings.width
         )
-        append_episode(dataset, copies[0])  # the first call loads libraries
+        append_episode(dataset, copies[0], settings)  # the first call loads libraries
         start = time.perf_counter()
         for copy in copies[1:]:
             store.write(copy, keep_frames=True)
-            append_episode(dataset, store.read(copy.pair))
+            append_episode(dataset, store.read(copy.pair), settings)
         elapsed = time.perf_counter() - start
         dataset.finalize()
     frames = episode.length * (len(copies) - 1)

@@ -94,39 +94,58 @@ def dig_cycle() -> Iterator[Tool]:
             yield tool_at(start + share * travel, pitch, rate * travel, rate * turn)
 
 
-def real_time_factor(seed: int) -> dict[str, float]:
+def real_time_factor(seed: int, fidelity: str = "standard") -> dict[str, float]:
     """Time one scripted cycle on this machine.
 
     Args:
-        seed: Seed of the soil; it changes the jitter of the spill, hardly the time.
+        seed: Seed of the soil; it changes the jitter of new parcels, hardly the time.
+        fidelity: Numerical effort.
 
     Returns:
-        `real_time_factor` (simulated over computing time of the cycle), `mean_ms`, `p95_ms` and `worst_ms` per
-        tick, `idle_ms` per tick at rest without a tool, and `retained_mass_kg` of the cycle.
+        `real_time_factor` (simulated over computing time of the cycle); `mean_ms`, `p50_ms`, `p95_ms` and `worst_ms`
+        per tick; `idle_ms` per tick at rest without a tool; `mean_parcels`, `most_parcels`, `mean_awake` and
+        `most_awake` parcels; and `retained_mass_kg` of the cycle.
     """
-    soil = Soil(seed=seed, container=BOX)
+    soil = Soil(fidelity=fidelity, seed=seed, container=BOX)
     for _ in range(2):  # the first cycle loads or compiles the kernels
         soil.reset(cone(soil))
-        times = _times_ms(soil, list(dig_cycle()))
-    retained = soil.ledger_kg()["box"]
+        times, parcels, awake = timed_steps(soil, list(dig_cycle()))
+    retained = soil.box_mass_kg
     for _ in range(200):
         soil.step(TICK_S)
-    idle = _times_ms(soil, [None] * 200)
+    idle, _, _ = timed_steps(soil, [None] * 200)
     return {
         "real_time_factor": TICK_S * 1e3 / float(times.mean()),
         "mean_ms": float(times.mean()),
+        "p50_ms": float(np.percentile(times, 50)),
         "p95_ms": float(np.percentile(times, 95)),
         "worst_ms": float(times.max()),
         "idle_ms": float(idle.mean()),
+        "mean_parcels": float(parcels.mean()),
+        "most_parcels": float(parcels.max()),
+        "mean_awake": float(awake.mean()),
+        "most_awake": float(awake.max()),
         "retained_mass_kg": retained,
     }
 
 
-def _times_ms(soil: Soil, tools: list[Tool] | list[None]) -> Array:
-    """Step once per tool and return the computing time of each step."""
-    times = []
-    for tool in tools:
+def timed_steps(soil: Soil, tools: list[Tool] | list[None]) -> tuple[Array, Array, Array]:
+    """Step a soil and watch it.
+
+    Args:
+        soil: The soil.
+        tools: One per step; None for a step without a tool.
+
+    Returns:
+        Of each step (n,): computing time [ms], number of parcels after it, and how many of them were awake.
+    """
+    seen = np.zeros((3, len(tools)))
+    for k, tool in enumerate(tools):
         start = time.perf_counter()
         soil.step(TICK_S, tool)
-        times.append(1e3 * (time.perf_counter() - start))
-    return np.array(times)
+        seen[:, k] = (
+            1e3 * (time.perf_counter() - start),
+            len(soil.parcel_masses_kg),
+            soil.awake_parcel_count,
+        )
+    return seen[0], seen[1], seen[2]

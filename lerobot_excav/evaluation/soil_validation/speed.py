@@ -118,8 +118,8 @@ EXPERIMENT = Experiment(
     code="T14",
     title="Speed",
     source="Needs of training and of a person at the controls",
-    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of growing "
-    "size (the quickest of three runs of each step).",
+    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "
+    "growing size (the quickest of three runs of each step).",
     gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
     "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
     run=run,
