@@ -8,13 +8,16 @@ import datasets as hf_datasets
 import numpy as np
 from lerobot.datasets import LeRobotDataset
 
+from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.episode import Episode
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
+    FIDELITY_KEY,
     PAIR_KEY,
     ROBOT_TYPE,
     SCENE_KEY,
     SIMULATION_KEY,
+    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
@@ -49,14 +52,22 @@ def create_dataset(root: Path, *, fps: int, height: int, width: int) -> LeRobotD
     )
 
 
-def append_episode(dataset: LeRobotDataset, episode: Episode) -> None:
-    """Add an episode to a dataset that is being written."""
+def append_episode(dataset: LeRobotDataset, episode: Episode, settings: DemonstrationSettings) -> None:
+    """Add an episode to a dataset that is being written.
+
+    Args:
+        dataset: The dataset.
+        episode: The episode.
+        settings: What it was played with.
+    """
     constant = {
         SCENE_KEY: np.array([episode.pair.scene_id], dtype=np.int64),
         TARGET_KEY: np.array([episode.pair.target_id], dtype=np.int64),
         PAIR_KEY: episode.pair.uid,
         SUCCESS_KEY: np.array([episode.success]),
         SIMULATION_KEY: np.array([SIMULATION_VERSION], dtype=np.int64),
+        SOIL_KEY: settings.soil,
+        FIDELITY_KEY: settings.fidelity,
         "task": episode.task,
     }
     for frame in range(episode.length):

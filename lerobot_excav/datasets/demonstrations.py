@@ -117,7 +117,7 @@ def _fill(
         for pair, future in futures.items():
             outcome = episode_result(pair, future)
             if outcome["kept"]:
-                append_episode(dataset, EpisodeStore(partial.episodes).read(pair))
+                append_episode(dataset, EpisodeStore(partial.episodes).read(pair), settings)
             outcomes.append(outcome)
     if not any(outcome["kept"] for outcome in outcomes):
         raise DatasetError(

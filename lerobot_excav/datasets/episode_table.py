@@ -20,15 +20,17 @@ from PIL import Image
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
+    FIDELITY_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
+    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
+    UNMARKED,
 )
-from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 CODEBASE_VERSION = "v3.0"
@@ -76,6 +78,16 @@ class EpisodeTable:
     def simulation_version(self) -> int:
         """Version of the simulation that the episode was recorded in."""
         return int(self._constant(SIMULATION_KEY))
+
+    @property
+    def soil(self) -> str:
+        """Name of the soil preset."""
+        return str(self._constant(SOIL_KEY))
+
+    @property
+    def fidelity(self) -> str:
+        """Numerical effort of the soil."""
+        return str(self._constant(FIDELITY_KEY))
 
     @property
     def pair(self) -> Pair:
@@ -156,7 +168,7 @@ def iterate_episodes(
 
     Args:
         root: The dataset.
-        keys: Columns to read. A dataset without `excav.simulation_version` is of the version that did not write it.
+        keys: Columns to read. Those of `schema.UNMARKED` that a dataset lacks are filled in.
         episodes: Episode indices; all by default.
 
     Yields:
@@ -182,10 +194,11 @@ def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iter
 
 
 def _marked(table: pa.Table, columns: Sequence[str]) -> pa.Table:
-    """Add the version of the simulation to a table that was asked for it and lacks it."""
-    if SIMULATION_KEY not in columns or SIMULATION_KEY in table.column_names:
-        return table
-    return table.append_column(SIMULATION_KEY, pa.array([UNMARKED_VERSION] * table.num_rows, pa.int64()))
+    """Fill in columns that were asked for and that the first version of the simulation did not write."""
+    for key, value in UNMARKED.items():
+        if key in columns and key not in table.column_names:
+            table = table.append_column(key, pa.array([value] * table.num_rows))
+    return table
 
 
 def require_single_task(root: Path, episodes: Collection[int]) -> None:

@@ -5,6 +5,10 @@ from dataclasses import dataclass
 import pandas as pd
 
 SCENE_COLUMNS = ["env", "scene_set", "scene_id"]
+"""What numbers a scene."""
+
+PILE_COLUMNS = [*SCENE_COLUMNS, "soil"]
+"""What determines a starting situation: the same scene is another pile on another soil."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,8 +18,8 @@ class PairCoverage:
     Attributes:
         scenes: Number of scenes.
         targets: Number of different targets in the index.
-        missing: By scene (`env/scene_set/scene_id`), the targets it lacks.
-        duplicates: By `pair_uid`, the episodes that show it, where there is more than one.
+        missing: By scene (`env/scene_set/scene_id`, and its soil if there are several), the targets it lacks.
+        duplicates: By `pair_uid` (and its soil if there are several), the episodes that show it, if more than one.
     """
 
     scenes: int
@@ -39,15 +43,19 @@ def pair_coverage(index: pd.DataFrame) -> PairCoverage:
         Counts, missing targets and duplicates.
     """
     targets = set(index["target_id"])
+    on_soil = " on {}" if index["soil"].nunique() > 1 else ""
     scenes = {
-        f"{env}/{scene_set}/{scene_id}": set(rows["target_id"])
-        for (env, scene_set, scene_id), rows in index.groupby(SCENE_COLUMNS)
+        f"{env}/{scene_set}/{scene_id}{on_soil.format(soil)}": set(rows["target_id"])
+        for (env, scene_set, scene_id, soil), rows in index.groupby(PILE_COLUMNS)
     }
     missing = {scene: sorted(targets - shown) for scene, shown in scenes.items() if shown != targets}
-    repeated = index[index.duplicated("pair_uid", keep=False)].groupby("pair_uid")["episode_index"]
+    pair = ["pair_uid", "soil"]
+    repeated = index[index.duplicated(pair, keep=False)].groupby(pair)["episode_index"]
     return PairCoverage(
         scenes=len(scenes),
         targets=len(targets),
         missing=missing,
-        duplicates={str(uid): [int(i) for i in episodes] for uid, episodes in repeated},
+        duplicates={
+            f"{uid}{on_soil.format(soil)}": [int(i) for i in episodes] for (uid, soil), episodes in repeated
+        },
     )

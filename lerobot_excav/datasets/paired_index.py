@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
+    FIDELITY_KEY,
     MASK_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
+    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
@@ -39,6 +41,8 @@ INDEX_KEYS = (
     TASK_STATE_KEY,
     SUCCESS_KEY,
     SIMULATION_KEY,
+    SOIL_KEY,
+    FIDELITY_KEY,
 )
 
 UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
@@ -88,6 +92,8 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
         "episode_index": episode.index,
         **pair._asdict(),
         "simulation_version": episode.simulation_version,
+        "soil": episode.soil,
+        "fidelity": episode.fidelity,
         "length": episode.length,
         "success": episode.success,
         **_mask_summary(episode.image(MASK_KEY, 0)),

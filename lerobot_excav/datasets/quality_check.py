@@ -11,7 +11,7 @@ from lerobot_excav.datasets.episode_check import MAIN_KEY, episode_problems, sce
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, build_index, store_index
-from lerobot_excav.datasets.replay_check import SoilChoice, replay_problem, soil_of
+from lerobot_excav.datasets.replay_check import replay_problem
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import require_columns
 from lerobot_excav.datasets.version_check import require_this_simulation, versions_of
@@ -24,8 +24,6 @@ def check_dataset(
     episodes: Collection[int] | None = None,
     replays: int = 3,
     seed: int = 0,
-    soil: str | None = None,
-    fidelity: str | None = None,
     rig: Rig | None = None,
 ) -> pd.DataFrame:
     """Check a dataset and note the verdicts in its index.
@@ -35,16 +33,14 @@ def check_dataset(
         episodes: Episodes to check; all by default.
         replays: How many of them to replay, chosen at random.
         seed: Seed of that choice.
-        soil: Soil of the replays; by default what the dataset says.
-        fidelity: Its numerical effort; by default what the dataset says.
         rig: Makes the environment of the replays; the excavator by default.
 
     Returns:
         The checked rows of the index, with `qc` (`passed` or `failed`), `qc_problem` and `replayed`.
 
     Raises:
-        DatasetError: A column is missing or contradictory, the soil of a replay is unknown, or it was recorded in
-            another version of the simulation.
+        DatasetError: A column is missing or contradictory, or replays are asked for of what another version of the
+            simulation recorded.
         ConfigurationError: An episode that does not exist, or a negative number of replays.
     """
     info = read_info(root)
@@ -67,9 +63,8 @@ def check_dataset(
             {i: versions[i] for i in wanted}, source=root, instead="; --replays=0 checks all but replays"
         )
         rig = rig or ExcavatorRig(with_images=False)
-        choice = SoilChoice(soil, fidelity) if soil and fidelity else _chosen(soil_of(root), soil, fidelity)
         for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
-            problem = replay_problem(rig, recorded, fps=info.fps, soil=choice)
+            problem = replay_problem(rig, recorded, fps=info.fps)
             problems[recorded.index] = [problem] if problem else []
 
     checked = index["episode_index"].isin(wanted)
@@ -80,17 +75,13 @@ def check_dataset(
     return index[checked].assign(replayed=index["episode_index"].isin(sample))
 
 
-def _chosen(recorded: SoilChoice, soil: str | None, fidelity: str | None) -> SoilChoice:
-    return SoilChoice(soil or recorded.soil, fidelity or recorded.fidelity)
-
-
 def _static_problems(root: Path, wanted: list[int]) -> dict[int, list[str]]:
     problems: dict[int, list[str]] = {}
-    scenes: dict[tuple[int, Pair], list[EpisodeTable]] = defaultdict(list)
+    scenes: dict[tuple[int, str, Pair], list[EpisodeTable]] = defaultdict(list)
     for episode in iterate_episodes(root, (*INDEX_KEYS, MAIN_KEY, "frame_index"), episodes=wanted):
         problems[episode.index] = episode_problems(episode)
         if not problems[episode.index]:
-            scene = (episode.simulation_version, episode.pair._replace(target_id=0))
+            scene = (episode.simulation_version, episode.soil, episode.pair._replace(target_id=0))
             scenes[scene].append(episode.first_frame())
     for starts in scenes.values():
         for number, problem in scene_problems(starts).items():

@@ -1,68 +1,25 @@
 """Replaying recorded actions and comparing what comes out with what was recorded."""
 
-from pathlib import Path
-from typing import NamedTuple
-
 import numpy as np
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.episode import replay
 from lerobot_excav.datasets.episode_table import EpisodeTable
-from lerobot_excav.datasets.provenance import PROVENANCE_PATH, read_provenance
 from lerobot_excav.datasets.resimulation import STATE_TOLERANCE
 from lerobot_excav.datasets.rig import Rig
-from lerobot_excav.datasets.session import SESSION_PATH, read_session
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
-from lerobot_excav.errors import DatasetError
 
 TASK_STATE_TOLERANCE = 1e-2
 """Allowed deviation of a task state, in its own unit (guess; the same build repeats exactly)."""
 
 
-class SoilChoice(NamedTuple):
-    """Which soil a dataset was made with.
-
-    Attributes:
-        soil: Name of the soil preset.
-        fidelity: Numerical effort of the soil.
-    """
-
-    soil: str
-    fidelity: str
-
-
-def soil_of(root: Path) -> SoilChoice:
-    """Return the soil that a dataset was made with.
-
-    Raises:
-        DatasetError: The dataset does not say, or names several.
-    """
-    if (root / PROVENANCE_PATH).is_file():
-        settings = read_provenance(root).settings
-        return SoilChoice(settings.soil, settings.fidelity)
-    if (root / SESSION_PATH).is_file():
-        episodes = read_session(root / SESSION_PATH).values()
-        soils = {SoilChoice(episode.soil, episode.fidelity) for episode in episodes}
-        if len(soils) == 1:
-            return soils.pop()
-        used = sorted(" ".join(soil) for soil in soils)
-        raise DatasetError(
-            f"the recordings of {root} used several soils: {used}; choose with --soil and --fidelity"
-        )
-    raise DatasetError(
-        f"{root} does not say which soil it was made with (merging and editing drop that); "
-        "give --soil and --fidelity"
-    )
-
-
-def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int, soil: SoilChoice) -> str:
+def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int) -> str:
     """Play an episode again and describe how it deviates.
 
     Args:
         rig: Makes the environment.
         recorded: The episode with state, action, task state and `excav.*` columns.
         fps: Frames per second of the dataset.
-        soil: The soil of the dataset.
 
     Returns:
         The first deviation beyond tolerance, or an empty string.
@@ -72,8 +29,8 @@ def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int, soil: SoilChoi
         env=pair.env,
         scene_set=pair.scene_set,
         fps=fps,
-        soil=soil.soil,
-        fidelity=soil.fidelity,
+        soil=recorded.soil,
+        fidelity=recorded.fidelity,
         episode_length=recorded.length + 1,
     )
     env = rig.environment(settings)

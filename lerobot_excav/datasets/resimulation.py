@@ -27,16 +27,18 @@ from lerobot_excav.datasets.recording_check import (
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
+    FIDELITY_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
+    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
     excav_features,
 )
-from lerobot_excav.datasets.session import SESSION_PATH, SessionEpisode, read_session
+from lerobot_excav.datasets.session import SessionEpisode, read_session
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
@@ -80,8 +82,7 @@ def complete_recording(
             renumbered = {number: session[index] for number, index in enumerate(whole)}
             require_recorded_targets(reduced, renumbered, rig or ExcavatorRig())
             episodes = _resimulate_all(reduced, renumbered, rig or ExcavatorRig(with_images=False))
-            _write_completed(reduced, episodes, temporary)
-        shutil.copyfile(session_path, temporary / SESSION_PATH)
+            _write_completed(reduced, episodes, renumbered, temporary)
         write_index(temporary)
         return _put_in_place(temporary, root, out)
     finally:
@@ -127,7 +128,9 @@ def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Ep
     return played
 
 
-def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> None:
+def _write_completed(
+    root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path
+) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
 
     def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
@@ -144,6 +147,8 @@ def _write_completed(root: Path, episodes: dict[int, Episode], out: Path) -> Non
         TASK_STATE_KEY: (task_state, excav_features()[TASK_STATE_KEY]),
         SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
         SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, SIMULATION_VERSION)),
+        SOIL_KEY: constant(SOIL_KEY, {i: session[i].soil for i in episodes}),
+        FIDELITY_KEY: constant(FIDELITY_KEY, {i: session[i].fidelity for i in episodes}),
     }
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)

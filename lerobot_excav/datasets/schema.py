@@ -10,6 +10,7 @@ from typing import Any
 
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
 from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 ROBOT_TYPE = "excavator_sim"
@@ -23,6 +24,15 @@ PAIR_KEY = "excav.pair_uid"
 TASK_STATE_KEY = "excav.task_state"
 SUCCESS_KEY = "excav.success"
 SIMULATION_KEY = "excav.simulation_version"
+SOIL_KEY = "excav.soil"
+FIDELITY_KEY = "excav.fidelity"
+
+UNMARKED: dict[str, int | str] = {
+    SIMULATION_KEY: UNMARKED_VERSION,
+    SOIL_KEY: "unknown",
+    FIDELITY_KEY: "standard",
+}
+"""Columns that the first version of the simulation did not write, and what its datasets are taken to hold there."""
 
 Feature = dict[str, Any]
 
@@ -45,6 +55,8 @@ def excav_features() -> dict[str, Feature]:
         },
         SUCCESS_KEY: {"dtype": "bool", "shape": (1,), "names": None},
         SIMULATION_KEY: {"dtype": "int64", "shape": (1,), "names": None},
+        SOIL_KEY: {"dtype": "string", "shape": (1,), "names": None},
+        FIDELITY_KEY: {"dtype": "string", "shape": (1,), "names": None},
     }
 
 
@@ -76,7 +88,7 @@ def dataset_features(*, height: int, width: int) -> dict[str, Feature]:
 def require_columns(features: dict[str, Feature]) -> None:
     """Check that a dataset has the columns of this schema with the right types.
 
-    `excav.simulation_version` may be missing: datasets of the first version have no such column.
+    `UNMARKED` may be missing together: datasets of the first version have no such columns.
 
     Args:
         features: Feature descriptions of the dataset.
@@ -85,7 +97,8 @@ def require_columns(features: dict[str, Feature]) -> None:
         DatasetError: A column is missing or is of another type.
     """
     expected = dataset_features(height=0, width=0)
-    missing = [key for key in expected if key not in features and key != SIMULATION_KEY]
+    optional = UNMARKED if SIMULATION_KEY not in features else {}
+    missing = [key for key in expected if key not in features and key not in optional]
     if missing:
         hint = "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`"
         raise DatasetError(f"the dataset lacks {', '.join(missing)}; {hint}")

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from lerobot_excav.datasets.pair_coverage import SCENE_COLUMNS
+from lerobot_excav.datasets.pair_coverage import PILE_COLUMNS
 from lerobot_excav.datasets.paired_index import FAILED
 from lerobot_excav.errors import DatasetError, require, require_choice
 
@@ -14,7 +14,7 @@ COMPOSITIONS: tuple[Composition, ...] = ("all", "paired", "non-paired", "balance
 
 
 def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFrame:
-    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair.
+    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair and soil.
 
     Args:
         index: A paired-scene index.
@@ -23,7 +23,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
     rows = index[index["qc"] != FAILED]
     if not include_failures:
         rows = rows[rows["success"]]
-    return rows.sort_values("episode_index").drop_duplicates("pair_uid")
+    return rows.sort_values("episode_index").drop_duplicates(["pair_uid", "soil"])
 
 
 def select(
@@ -45,7 +45,7 @@ def select(
     (except that `non-paired` may show a scene with another target).
 
     Args:
-        index: Rows to choose from, one per pair.
+        index: Rows to choose from, one per pair and soil; a scene on another soil counts as another scene.
         composition: One of `COMPOSITIONS`.
         episodes: How many episodes; as many as possible by default.
         scenes: How many scenes, in place of `episodes`; only for `paired` and `non-paired`.
@@ -84,8 +84,8 @@ def select(
 
 def _shuffle_scenes(index: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     """Order rows by a random order of the scenes, then by target; adds the column `scene_rank`."""
-    ordered = index.sort_values([*SCENE_COLUMNS, "target_id"])
-    number = ordered.groupby(SCENE_COLUMNS).ngroup().to_numpy()
+    ordered = index.sort_values([*PILE_COLUMNS, "target_id"])
+    number = ordered.groupby(PILE_COLUMNS).ngroup().to_numpy()
     rank = rng.permutation(number.max() + 1)
     return ordered.assign(scene_rank=rank[number]).sort_values(["scene_rank", "target_id"])
 

@@ -12,8 +12,6 @@ from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
-SESSION_PATH = Path("meta/excav_session.jsonl")
-
 _ENDLESS_FRAMES = 2**31 - 1  # the person with the joystick, not the environment, ended the episode
 
 

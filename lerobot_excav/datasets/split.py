@@ -46,7 +46,8 @@ def split(rows: pd.DataFrame, unit: SplitUnit, *, eval_fraction: float = 0.2, se
 
     Args:
         rows: Rows of a paired-scene index.
-        unit: `scene` holds out whole scenes, so no scene is in both parts; `episode` holds out single episodes.
+        unit: `scene` holds out whole scenes, on all soils, so none is in both parts; `episode` holds out single
+            episodes.
         eval_fraction: Part of the units to hold out, in [0, 1); at least one unit unless it is 0.
         seed: Seed of the choice.
 

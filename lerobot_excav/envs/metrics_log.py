@@ -88,12 +88,11 @@ class MetricsLog:
             self._append([self._finished[i] for i in range(self._n_envs)])
 
     def _line(self, env_index: int, info: Mapping[str, Any]) -> dict[str, Any]:
-        line = {
+        return {
             "episode_ix": self._batch * self._n_envs + env_index,
             "seed": self._seeds[env_index],
             **info["episode_metrics"],
         }
-        return {key: _plain(value) for key, value in line.items()}
 
     def _append(self, lines: list[dict[str, Any]]) -> None:
         """Append whole lines by one write each, so that two evaluations may share a file."""
@@ -101,9 +100,14 @@ class MetricsLog:
         try:
             for line in lines:
                 if self._max_episodes is None or line["episode_ix"] < self._max_episodes:
-                    os.write(descriptor, (json.dumps(line, allow_nan=False) + "\n").encode())
+                    os.write(descriptor, json_line(line).encode())
         finally:
             os.close(descriptor)
+
+
+def json_line(record: Mapping[str, Any]) -> str:
+    """Return a record as a line of JSON: NumPy scalars as Python's own, and numbers that JSON lacks as null."""
+    return json.dumps({key: _plain(value) for key, value in record.items()}, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:

@@ -10,6 +10,7 @@ from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.rig import ExcavatorRig, Rig
 from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.envs.metrics_log import json_line
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
@@ -84,15 +85,14 @@ def _play_rest(
             submit_episode(pool, progress, play_for_metrics, rig, settings, pair) for pair in pairs[first:]
         ]
         for number, future in enumerate(futures, first):
-            line = {"episode_ix": number, **episode_result(pairs[number], future)}
-            file.write(json.dumps(line, allow_nan=False) + "\n")
+            file.write(json_line({"episode_ix": number, **episode_result(pairs[number], future)["line"]}))
             file.flush()
 
 
 def play_for_metrics(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
-    """Play one episode and return its line of the metrics file; runs in a worker."""
+    """Play one episode and return its `success` and its `line` of the metrics file; runs in a worker."""
     episode = play_demonstration(rig, settings, pair)
-    return {**_operator(settings), **episode.metrics}
+    return {"success": episode.success, "line": {**_operator(settings), **episode.metrics}}
 
 
 def _operator(settings: DemonstrationSettings) -> dict[str, Any]:

@@ -106,6 +106,8 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
     lines = [
         "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in sorted(versions.items())),
+        "soil: "
+        + "; ".join(f"{soil}, {count} episodes" for soil, count in index["soil"].value_counts().items()),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
         f"retained mass: {index['retained_mass_kg'].mean():.0f} kg on average",

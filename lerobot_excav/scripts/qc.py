@@ -8,16 +8,14 @@ Examples:
       check every episode, replay 3 of them
   lerobot-excav qc outputs/paired --replays=20 --seed=1
       replay 20, other ones
-  lerobot-excav qc outputs/merged --episodes=0,5,7 --replays=3 --soil=sand --fidelity=standard
-      check three episodes; merging lost the record of the soil
+  lerobot-excav qc outputs/merged --episodes=0,5,7 --replays=3
+      check three episodes, and replay them all
 """
 
 import argparse
 from pathlib import Path
 
 import pandas as pd
-
-from lerobot_excav.envs.settings import FIDELITIES, SOILS
 
 DEFAULT_REPLAYS = 3
 
@@ -33,10 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"episodes to replay (default: {DEFAULT_REPLAYS})",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the choice of replays (default: 0)")
-    parser.add_argument("--soil", choices=SOILS, help="soil of the replays (default: what the dataset says)")
-    parser.add_argument(
-        "--fidelity", choices=FIDELITIES, help="its numerical effort (default: what the dataset says)"
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -49,8 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
         episodes=arguments.episodes,
         replays=arguments.replays,
         seed=arguments.seed,
-        soil=arguments.soil,
-        fidelity=arguments.fidelity,
     )
     failed = rows[rows["qc"] == FAILED]
     for line in failure_table(failed):

@@ -42,6 +42,7 @@ def test_frames_read_back_as_they_were_played(paired_dataset, toy_rig, toy_setti
             image = (item[f"observation.images.{camera}"].numpy() * 255).round().astype(np.uint8)
             np.testing.assert_array_equal(image.transpose(1, 2, 0), frames[frame])
         assert item["excav.pair_uid"] == pair.uid
+        assert (item["excav.soil"], item["excav.fidelity"]) == (settings.soil, settings.fidelity)
         assert (int(item["excav.scene_id"]), int(item["excav.target_id"])) == (pair.scene_id, pair.target_id)
         assert bool(item["excav.success"])
         assert item["task"] == "Dig where the mask points."

@@ -4,9 +4,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from lerobot.datasets import LeRobotDataset, merge_datasets
 
 from lerobot_excav.datasets.paired_index import build_index
-from lerobot_excav.datasets.provenance import PROVENANCE_PATH
 from lerobot_excav.datasets.quality_check import check_dataset
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
@@ -150,12 +150,14 @@ def test_a_wrong_outcome_is_found(tampered, toy_rig):
     assert found == {5: "replay ends with success=True, recorded False"}
 
 
-def test_replays_need_to_know_the_soil(paired_dataset, toy_rig, tmp_path):
-    shutil.copytree(paired_dataset, tmp_path / "d")
-    (tmp_path / "d" / PROVENANCE_PATH).unlink()
-    with pytest.raises(DatasetError, match="give --soil and --fidelity"):
-        check_dataset(tmp_path / "d", replays=1, rig=toy_rig())
-    given = {"soil": "sand", "fidelity": "standard"}
-    with pytest.raises(DatasetError, match="give --soil and --fidelity"):
-        check_dataset(tmp_path / "d", replays=1, soil="sand", rig=toy_rig())
-    assert set(check_dataset(tmp_path / "d", replays=1, rig=toy_rig(), **given)["qc"]) == {"passed"}
+def test_every_episode_is_replayed_on_its_own_soil(record_toy, toy_rig, tmp_path, monkeypatch):
+    for soil in ("gravel", "dirt"):
+        record_toy(tmp_path / soil, scenes=1, targets=1, soil=soil, fidelity="fast")
+    parts = [LeRobotDataset("local/p", root=tmp_path / s, video_backend="pyav") for s in ("gravel", "dirt")]
+    merge_datasets(parts, "local/m", output_dir=tmp_path / "m")
+    made, make = [], toy_rig.environment
+    monkeypatch.setattr(
+        toy_rig, "environment", lambda self, settings: (made.append(settings), make(self, settings))[1]
+    )
+    assert set(check_dataset(tmp_path / "m", replays=2, rig=toy_rig())["qc"]) == {"passed"}
+    assert [(settings.soil, settings.fidelity) for settings in made] == [("gravel", "fast"), ("dirt", "fast")]

@@ -7,6 +7,7 @@ from lerobot.utils.feature_utils import combine_feature_dicts
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.schema import (
     ROBOT_TYPE,
+    UNMARKED,
     dataset_features,
     excav_features,
     require_columns,
@@ -48,10 +49,12 @@ def test_columns_of_the_schema_are_accepted():
     require_columns(dataset_features(height=96, width=128))
 
 
-def test_the_version_of_the_simulation_may_be_missing_as_in_first_datasets():
+def test_what_first_datasets_lack_may_be_missing_together_only():
     features = dataset_features(height=96, width=128)
-    del features["excav.simulation_version"]
-    require_columns(features)
+    require_columns({key: feature for key, feature in features.items() if key not in UNMARKED})
+    del features["excav.soil"]
+    with pytest.raises(DatasetError, match=r"lacks excav\.soil"):
+        require_columns(features)
 
 
 def test_a_recording_without_excav_columns_is_refused_with_the_next_step():

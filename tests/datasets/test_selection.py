@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lerobot_excav.datasets.pair_coverage import pair_coverage
 from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
+from lerobot_excav.datasets.split import split
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
@@ -19,6 +21,7 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
             "scene_set": "train",
             "scene_id": scene,
             "target_id": target,
+            "soil": "sand",
             "success": True,
             "qc": "unchecked",
         }
@@ -109,3 +112,36 @@ def test_contradictory_arguments_are_named(arguments, message):
 def test_an_empty_index_is_refused():
     with pytest.raises(DatasetError, match="no usable episode"):
         select(usable(index_of([(0, 0)], success=False)), "all")
+
+
+def two_soils(pairs: list[tuple[int, int]]) -> pd.DataFrame:
+    both = [index_of(pairs), index_of(pairs, soil="gravel")]
+    index = pd.concat(both, ignore_index=True)
+    return index.assign(episode_index=range(len(index)))
+
+
+def test_a_pair_on_another_soil_is_no_duplicate():
+    assert len(usable(two_soils([(0, 0), (0, 1)]))) == 4
+
+
+def test_a_scene_on_another_soil_counts_as_another_scene():
+    index = two_soils([(0, 0), (0, 1)])
+    index = index[index["episode_index"] != 1]  # sand lacks target 1
+    assert set(select(index, "paired")["soil"]) == {"gravel"}
+    assert len(select(index, "non-paired")) == 2
+
+
+def test_a_split_by_scene_holds_a_scene_out_on_all_soils():
+    index = two_soils([(scene, 0) for scene in range(5)])
+    parts = split(index, "scene", eval_fraction=0.2)
+    held_out = index[index["episode_index"].isin(parts.evaluation)]
+    assert sorted(held_out["soil"]) == ["gravel", "sand"]
+    assert held_out["scene_id"].nunique() == 1
+
+
+def test_coverage_names_the_soil_where_there_are_several():
+    index = two_soils([(0, 0), (0, 1)])
+    coverage = pair_coverage(index[index["episode_index"] != 1])
+    assert coverage.scenes == 2
+    assert coverage.missing == {"excavator/train/0 on sand": [1]}
+    assert coverage.duplicates == {}

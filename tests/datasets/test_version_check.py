@@ -8,6 +8,7 @@ from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, re
 from lerobot_excav.datasets import assembly, partial_run
 from lerobot_excav.datasets.paired_index import build_index, write_index
 from lerobot_excav.datasets.quality_check import check_dataset
+from lerobot_excav.datasets.schema import UNMARKED
 from lerobot_excav.datasets.version_check import require_one_version, versions_of
 from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -24,7 +25,7 @@ def load(root):
 def first_dataset(paired_dataset, tmp_path_factory):
     """Make a dataset as the first version did: without the column. Not to be changed by tests."""
     root = tmp_path_factory.mktemp("first") / "dataset"
-    remove_feature(load(paired_dataset), KEY, output_dir=root, repo_id="local/first")
+    remove_feature(load(paired_dataset), list(UNMARKED), output_dir=root, repo_id="local/first")
     return root
 
 
@@ -58,7 +59,9 @@ def test_the_version_survives_deleting_splitting_and_merging(mixed_dataset, tmp_
 
 def test_a_dataset_without_the_column_is_of_the_first_version(first_dataset, tmp_path):
     shutil.copytree(first_dataset, tmp_path / "d")
-    assert set(write_index(tmp_path / "d")["simulation_version"]) == {UNMARKED_VERSION}
+    index = write_index(tmp_path / "d")
+    assert set(index["simulation_version"]) == {UNMARKED_VERSION}
+    assert set(index["soil"]) == {"unknown"}
 
 
 def test_an_older_dataset_is_checked_but_not_replayed(first_dataset, toy_rig, tmp_path):
@@ -83,12 +86,12 @@ def test_a_newer_dataset_is_not_replayed(mixed_dataset, toy_rig):
     with pytest.raises(
         DatasetError, match=r"episodes 19, 20, 21 and 1 more of version .* this older package"
     ):
-        check_dataset(mixed_dataset, replays=1, soil="sand", fidelity="standard", rig=toy_rig())
+        check_dataset(mixed_dataset, replays=1, rig=toy_rig())
 
 
 def test_what_this_version_recorded_in_a_mixed_dataset_is_replayed(mixed_dataset, toy_rig):
-    options = {"soil": "sand", "fidelity": "standard", "rig": toy_rig()}
-    assert set(check_dataset(mixed_dataset, episodes=range(19), replays=2, **options)["qc"]) == {"passed"}
+    rows = check_dataset(mixed_dataset, episodes=range(19), replays=2, rig=toy_rig())
+    assert set(rows["qc"]) == {"passed"}
 
 
 def test_lerobot_does_not_merge_a_dataset_with_one_of_the_first_version(

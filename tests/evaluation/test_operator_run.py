@@ -1,3 +1,4 @@
+import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,6 +92,18 @@ def test_the_scripted_operator_fills_the_box_without_pictures(tmp_path):
     )
     (episode,) = read_evaluation(tmp_path / "o.jsonl").episodes.values()
     assert episode.retained_mass_kg > 0.0
+
+
+def test_an_episode_that_never_loads_is_written_too(tmp_path):
+    rig, settings = ExcavatorRig(with_images=False), replace(SETTINGS, scenes=1, episode_length=1)
+    evaluate_operator(settings, tmp_path / "o.jsonl", workers=0, rig=rig, show_progress=False)
+    line = json.loads((tmp_path / "o.jsonl").read_text())
+    assert (line["loading_onset_time_s"], line["is_success"]) == (None, False)
+
+
+def test_successes_are_counted_on_the_bar(tmp_path, capsys):
+    evaluate_operator(SETTINGS, tmp_path / "o.jsonl", workers=0, rig=StillRig(), show_progress=True)
+    assert "3/3" in capsys.readouterr().err
 
 
 def test_an_existing_file_is_not_overwritten(tmp_path):

@@ -21,6 +21,7 @@ def output(capsys):
 def test_missing_targets_are_listed(paired_dataset, output):
     text = output(paired_dataset)
     assert "19 episodes" in text
+    assert "soil: sand, 19 episodes" in text
     assert "scenes: 5, of which 4 with all 4 targets" in text
     assert "missing: excavator/train/3 lacks target [1]" in text
     assert "lerobot-train" not in text
