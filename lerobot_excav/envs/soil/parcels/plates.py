@@ -79,22 +79,22 @@ def _on_segment(profile: Array, k: int, x: float, z: float) -> tuple[float, floa
 
 
 @kernel
-def nearest_on_plate(tool: ToolPath, plate: int, q: Vector) -> Vector:
+def nearest_on_plate(profile: Array, planes: Array, half_width: float, plate: int, q: Vector) -> Vector:
     """Return the point of a plate nearest to a tool point.
 
     Plates 0 to n - 2 are the shell from the edge to the lip, n - 1 and n the right and the left side.
     """
-    sides = len(tool.profile) - 1
+    sides = len(profile) - 1
     if plate < sides:
-        x, z = _on_segment(tool.profile, plate, q[0], q[2])
-        return x, min(max(q[1], -tool.half_width), tool.half_width), z
-    y = -tool.half_width if plate == sides else tool.half_width
+        x, z = _on_segment(profile, plate, q[0], q[2])
+        return x, min(max(q[1], -half_width), half_width), z
+    y = -half_width if plate == sides else half_width
     x, z = q[0], q[2]
     best = 0.0
-    for k in range(len(tool.profile)):  # plane 0 is the opening: the last side of the closed profile
+    for k in range(len(profile)):  # plane 0 is the opening: the last side of the closed profile
         plane = k + 1 if k < sides else 0
-        if tool.planes[plane, 0] * q[0] + tool.planes[plane, 2] * q[2] > tool.planes[plane, 3]:
-            a, b = _on_segment(tool.profile, k, q[0], q[2])
+        if planes[plane, 0] * q[0] + planes[plane, 2] * q[2] > planes[plane, 3]:
+            a, b = _on_segment(profile, k, q[0], q[2])
             far = (a - q[0]) ** 2 + (b - q[2]) ** 2
             if best == 0.0 or far < best:
                 best, x, z = far, a, b
@@ -125,7 +125,8 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
         dt: Duration [s].
     """
     position, rotation = tool.positions[step], tool.rotations[step]
-    linear, planes = tool.linear, tool.planes
+    linear, planes, profile, half_width = tool.linear, tool.planes, tool.profile, tool.half_width
+    near_plate, shell, forces, torques = state.near_plate, state.shell, state.forces, state.torques
     angular = (tool.angular[0], tool.angular[1], tool.angular[2])
     positions, velocities, spins = state.positions, state.velocities, state.spins
     plates = state.plate_springs.shape[1]
@@ -133,19 +134,19 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
     reach = bucket_reach(tool)
     sides = len(tool.profile) + 1
     for i in range(len(state.masses)):
-        state.shell[i] = OFF_BUCKET
+        shell[i] = OFF_BUCKET
         if state.asleep[i]:
             continue
         r = state.radii[i]
         q = to_tool(position, rotation, positions[i, 0], positions[i, 1], positions[i, 2])
-        if q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + r) ** 2:
+        if q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + 2.0 * r) ** 2:  # 1 r more: see to old contacts
             continue
         depth = inside_depth(planes, 1, q)
         if depth > 0.0 and inside_depth(planes[:1], 0, q) > opening_margin:
-            state.shell[i] = SHELTERED
-        if depth >= r and not state.near_plate[i]:
+            shell[i] = SHELTERED
+        if depth >= r and not near_plate[i]:
             continue
-        state.near_plate[i] = 0
+        near_plate[i] = 0
         for plate in range(sides):
             row = i * plates + plate
             n0, n1, n2, d = (
@@ -158,15 +159,15 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
             if abs(side) >= r:
                 forget(springs, row)
                 continue
-            c = nearest_on_plate(tool, plate, q)
+            c = nearest_on_plate(profile, planes, half_width, plate, q)
             away_t = (q[0] - c[0], q[1] - c[1], q[2] - c[2])
             gap = math.sqrt(away_t[0] ** 2 + away_t[1] ** 2 + away_t[2] ** 2)
             if gap >= r or gap < _HAIR_M:
                 forget(springs, row)
                 continue
-            state.near_plate[i] = 1
+            near_plate[i] = 1
             if side > 0.0:
-                state.shell[i] = OUTSIDE_OF_SHELL
+                shell[i] = OUTSIDE_OF_SHELL
             away = turned(rotation, away_t)
             normal = (away[0] / gap, away[1] / gap, away[2] / gap)
             if gap < CLOSEST * r:
@@ -179,12 +180,10 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
                 velocities[i, 2] - linear[2] - turning[2],
             )
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-            force, torque = wall_contact(
-                springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
-            )
+            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt)
             for a in range(3):
-                state.forces[i, a] += force[a]
-                state.torques[i, a] += torque[a]
+                forces[i, a] += force[a]
+                torques[i, a] += torque[a]
 
 
 @kernel
@@ -210,10 +209,10 @@ def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) ->
     springs = state.plate_springs.reshape((-1, SPRINGS))
     for i in range(len(state.masses)):
         r, z = state.radii[i], positions[i, 2]
-        if state.asleep[i] or z > box[5] + r:
+        if state.asleep[i] or z > box[5] + 2.0 * r:  # 1 r more: see to old contacts
             continue
         u, v = to_box(box, positions[i, 0], positions[i, 1])
-        if abs(u) > box[3] + r or abs(v) > box[4] + r:
+        if abs(u) > box[3] + 2.0 * r or abs(v) > box[4] + 2.0 * r:
             continue
         for wall in range(4):
             row = i * plates + first + wall
