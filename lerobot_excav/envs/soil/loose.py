@@ -135,7 +135,7 @@ class LooseSoil:
         return self._merge(self.population.settle(dt_s))
 
     def weighed_heights(self) -> Array:
-        """Return (nx, ny) heights of the dig area [m] with the loose parcels outside of the bucket spread on their columns."""
+        """Return (nx, ny) heights of the dig area [m] with the parcels outside of the bucket put on their columns."""
         state, field = self.population.state, self._field
         rows = np.flatnonzero((state.load == 0) & field.contains(state.positions[:, :2]))
         if len(rows) == 0:

@@ -18,8 +18,11 @@ Array = NDArray[np.float64]
 LARGEST_HEAP_M = 0.35
 """Parcels up to this far above an opening that looks up belong to the load (guess: half the opening, 45 degrees)."""
 
-_LOOKS_UP = 0.3
-_LEAVING_M_S = 1.0
+LOOKS_UP = 0.3
+"""Least vertical part of the opening's normal that counts as up: 17 degrees above level (guess)."""
+
+LEAVING_M_S = 1.0
+"""Speed in the bucket above which a parcel over the opening has left the heap (guess)."""
 
 RESTING_SPEED_M_S = 0.05
 """Root mean square speed in the bucket below which a load is at rest (soil.md: 0.05 m/s)."""
@@ -66,10 +69,10 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
         state.load[i] = 0
         if above <= 0.0:
             state.load[i] = 1 if inside_depth(tool.planes, 1, q) > 0.0 else 0
-        elif above < LARGEST_HEAP_M and up > _LOOKS_UP and abs(q[1]) < tool.half_width:
+        elif above < LARGEST_HEAP_M and up > LOOKS_UP and abs(q[1]) < tool.half_width:
             along = (q[0] - first[0]) * (last[0] - first[0]) + (q[2] - first[1]) * (last[1] - first[1])
             over = 0.0 < along < length * length
-            state.load[i] = 1 if over and speed < _LEAVING_M_S**2 else 0
+            state.load[i] = 1 if over and speed < LEAVING_M_S**2 else 0
         if state.load[i]:
             mass += state.masses[i]
             energy += state.masses[i] * speed

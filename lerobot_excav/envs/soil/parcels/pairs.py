@@ -63,26 +63,25 @@ def room_for(capacity: int) -> Pairs:
     )
 
 
-def enlarged(pairs: Pairs, count: int, capacity: int) -> Pairs:
-    """Return a copy of the list of `count` parcels with room for more of them."""
+def enlarged(pairs: Pairs, capacity: int) -> Pairs:
+    """Return a copy of a list with room for more parcels."""
     new = room_for(capacity)
-    found = int(pairs.start[count])
-    while len(new.partner) < found:
+    while len(new.partner) < len(pairs.partner):
         new = _more_room(new)
-    new.start[: count + 1] = pairs.start[: count + 1]
     for source, target in (
+        (pairs.start, new.start),
         (pairs.partner, new.partner),
         (pairs.closed, new.closed),
         (pairs.springs, new.springs),
     ):
-        target[:found] = source[:found]
+        target[: len(source)] = source
     return new
 
 
 @kernel
 def _along(position: float, size: float, axis: int) -> int:
     """Return the index of a cell along an axis. Cells repeat: far parcels in one are told apart by distance."""
-    return int(math.floor(position / size)) & (_CELLS[axis] - 1)
+    return math.floor(position / size) & (_CELLS[axis] - 1)
 
 
 @kernel

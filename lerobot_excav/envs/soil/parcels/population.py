@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
-from lerobot_excav.envs.soil.parcels.pairs import Pairs, enlarged, room_for
+from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
 from lerobot_excav.envs.soil.parcels.store import (
     OUTSIDE_OF_SHELL,
