@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil import reference
 from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
 from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Intake
+from lerobot_excav.envs.soil.reference import bucket as reference
 
 CELL = 0.05
 PARCEL_RADIUS = 0.045

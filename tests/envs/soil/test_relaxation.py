@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lerobot_excav.envs.soil import reference
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
+from lerobot_excav.envs.soil.reference import avalanche
 from lerobot_excav.envs.soil.relaxation import REST_TAN, relax, sweep
 from lerobot_excav.errors import ConfigurationError
 
@@ -39,7 +39,7 @@ def steepest(heights: np.ndarray, cell: float) -> float:
 def test_a_sweep_is_the_reference_sweep(
     heights: np.ndarray, ceiling: np.ndarray, border: float, wide: float
 ) -> None:
-    expected, expected_over = reference.sweep(heights, ceiling, (CELL, wide), SLOPE, border)
+    expected, expected_over = avalanche.sweep(heights, ceiling, (CELL, wide), SLOPE, border)
     active, delta = np.ones(heights.shape, dtype=np.uint8), np.zeros_like(heights)
     over, _ = sweep(heights, delta, active, ceiling, (CELL, wide), SLOPE, border)
     np.testing.assert_allclose(heights, expected, rtol=0, atol=1e-12)
@@ -55,7 +55,7 @@ def test_following_only_active_columns_misses_nothing(heights: np.ndarray) -> No
     expected = heights.copy()
     for _ in range(40):
         sweep(heights, delta, active, ceiling, (CELL, CELL), SLOPE, 0.0)
-        expected, _ = reference.sweep(expected, ceiling, (CELL, CELL), SLOPE, 0.0)
+        expected, _ = avalanche.sweep(expected, ceiling, (CELL, CELL), SLOPE, 0.0)
     np.testing.assert_allclose(heights, expected, rtol=0, atol=1e-11)
 
 

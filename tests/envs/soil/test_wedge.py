@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil import reference
 from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.forces import soil_numbers
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
+from lerobot_excav.envs.soil.reference import wedge as reference
 from lerobot_excav.envs.soil.wedge import (
     EDGE_THICKNESS_M,
     PENETRATION_CAP_N,

@@ -1,0 +1,124 @@
+"""Small worlds of parcels: makers of states, tools and sites for the tests of this directory."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
+from lerobot_excav.envs.soil.motion import Pose, path
+from lerobot_excav.envs.soil.parcels.contact import Law
+from lerobot_excav.envs.soil.parcels.dynamics import Laws
+from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.plates import NO_BOX, ToolPath
+from lerobot_excav.envs.soil.parcels.population import Population
+from lerobot_excav.envs.soil.parcels.store import WALLS, State, empty_state
+
+RADIUS = 0.045
+MASS = 0.94
+DT = 0.001
+STIFFNESS = MASS * (0.2 / DT) ** 2
+PLATES = len(BUCKET.profile_t) + 1 + WALLS
+
+
+@pytest.fixture(scope="session")
+def laws() -> Laws:
+    return Laws(Law(STIFFNESS, 0.5, 0.3, 0.0), Law(STIFFNESS, 0.97, 0.6, 0.0), Law(STIFFNESS, 0.49, 0.3, 0.0))
+
+
+@pytest.fixture(scope="session")
+def make_state() -> Callable[..., State]:
+    """Return a maker of parcels from positions (n, 3) and any other array of a state by name."""
+
+    def make(positions: Any, **arrays: Any) -> State:
+        state = empty_state(len(positions), PLATES)
+        state.positions[:] = positions
+        state.radii[:] = RADIUS
+        state.masses[:] = MASS
+        for name, value in arrays.items():
+            getattr(state, name)[:] = value
+        return state
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def random_state(make_state: Callable[..., State]) -> Callable[..., State]:
+    """Return a maker of n parcels of different sizes that move and spin in a box of some size."""
+
+    def make(rng: np.random.Generator, count: int, half_size: Any, centre: Any = (0.0, 0.0, 0.0)) -> State:
+        radii = RADIUS * rng.uniform(0.7, 1.4, count)
+        return make_state(
+            np.asarray(centre) + rng.uniform(-1.0, 1.0, (count, 3)) * half_size,
+            velocities=rng.normal(0.0, 1.0, (count, 3)),
+            spins=rng.normal(0.0, 10.0, (count, 3)),
+            radii=radii,
+            masses=MASS * (radii / RADIUS) ** 3,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def tool_path() -> Callable[..., ToolPath]:
+    """Return a maker of a bucket's path from one position and pitch to another in some steps."""
+
+    def make(
+        position: Any = (0.0, 0.0, 0.0),
+        pitch: float = math.pi,
+        travel: Any = (0.0, 0.0, 0.0),
+        turn: float = 0.0,
+        steps: int = 1,
+        dt: float = DT,
+    ) -> ToolPath:
+        start = np.asarray(position, dtype=np.float64)
+        before = Pose(position=start, rotation=rotation_at(pitch))
+        now = Pose(position=start + np.asarray(travel), rotation=rotation_at(pitch + turn))
+        positions, rotations, turned = path(before, now, steps)
+        duration = steps * dt
+        return ToolPath(
+            1,
+            BUCKET.profile_t,
+            BUCKET.planes_t,
+            0.5 * float(BUCKET.inner_width_m),
+            positions,
+            rotations,
+            (now.position - before.position) / duration,
+            turned / duration,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def no_tool(tool_path: Callable[..., ToolPath]) -> Callable[[int], ToolPath]:
+    """Return a maker of the absence of a bucket for some sub-steps."""
+    return lambda steps: tool_path(steps=steps)._replace(present=0)
+
+
+@pytest.fixture(scope="session")
+def site() -> Callable[..., Site]:
+    """Return a maker of level ground of some height, 6 m x 6 m, with or without a box."""
+
+    def make(height: float = 0.0, heights: Any = None, box: Any = NO_BOX, box_heights: Any = None) -> Site:
+        cells = np.full((60, 60), height) if heights is None else np.asarray(heights, dtype=np.float64)
+        cell = 6.0 / len(cells)
+        first = -0.5 * (len(cells) - 1) * cell
+        inside = np.zeros((8, 6)) if box_heights is None else box_heights
+        size = 2.0 * box[3] / inside.shape[0], 2.0 * box[4] / inside.shape[1]
+        box_grid = (-box[3] + 0.5 * size[0], -box[4] + 0.5 * size[1], *size)
+        return Site(cells, (first, first, cell, cell), inside, box_grid, box, height)
+
+    return make
+
+
+@pytest.fixture
+def make_population(laws: Laws) -> Callable[..., Population]:
+    """Return a maker of empty populations."""
+
+    def make(most_awake: int = 1000, laws: Laws = laws) -> Population:
+        return Population(PLATES, laws, RADIUS, MASS, most_awake)
+
+    return make

@@ -1,0 +1,188 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil.parcels.dynamics import Laws, press_pairs
+from lerobot_excav.envs.soil.parcels.pairs import (
+    SKIN,
+    Pairs,
+    enlarged,
+    find_pairs,
+    is_outdated,
+    room_for,
+)
+from lerobot_excav.envs.soil.parcels.store import State
+from lerobot_excav.envs.soil.reference import pairs as reference
+
+RADIUS = 0.045
+DT = 0.001
+MakeState = Callable[..., State]
+
+
+def listed(pairs: Pairs, count: int) -> list[tuple[int, int]]:
+    return [
+        (i, int(pairs.partner[k])) for i in range(count) for k in range(pairs.start[i], pairs.start[i + 1])
+    ]
+
+
+def first_list(state: State, room: Pairs | None = None) -> Pairs:
+    count = len(state.masses)
+    none = np.full(count, -1, dtype=np.int64)
+    return find_pairs(
+        state.positions, state.radii, state.asleep, room_for(count), none, room or room_for(count)
+    )
+
+
+@given(seed=st.integers(0, 2**16), count=st.integers(1, 40), size=st.sampled_from([0.1, 0.3, 1.0, 4.0]))
+@settings(max_examples=60, deadline=None)
+def test_all_neighbours_are_listed_once_and_no_others(
+    random_state: MakeState, seed: int, count: int, size: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, count, size, centre=rng.uniform(-30.0, 30.0, 3))
+    state.asleep[:] = rng.random(count) < 0.4
+    found = listed(first_list(state), count)
+    assert len(found) == len(set(found))
+    assert set(found) == reference.neighbours(state.positions, state.radii, state.asleep)
+
+
+def test_parcels_whose_cells_have_the_same_number_are_no_neighbours(make_state: MakeState) -> None:
+    cell = (2.0 + SKIN) * RADIUS
+    far = cell * np.array([[32.0, 0.0, 0.0], [0.0, 32.0, 0.0], [0.0, 0.0, 16.0], [-64.0, 32.0, 16.0]])
+    state = make_state(np.concatenate([np.zeros((1, 3)), far]))
+    assert listed(first_list(state), 5) == []
+
+
+def test_a_crowd_gets_the_room_that_it_needs(make_state: MakeState) -> None:
+    """200 parcels at one point are 19,900 pairs, where there is room for 16 per parcel."""
+    state = make_state(np.zeros((200, 3)))
+    pairs = first_list(state)
+    assert len(listed(pairs, 200)) == 199 * 100
+    assert len(pairs.partner) == len(pairs.closed) == len(pairs.springs) == len(pairs.first)
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=60, deadline=None)
+def test_pair_forces_are_those_of_every_parcel_against_every_other(
+    random_state: MakeState, laws: Laws, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, 12, 0.12)
+    state.asleep[:] = rng.random(12) < 0.3
+    twin, memory = State(*(array.copy() for array in state)), {}
+    pairs = first_list(state)
+    law = laws.parcel._replace(cohesion=float(rng.choice([0.0, 2100.0])))
+    for _ in range(4):  # contacts open and close while the parcels are shaken
+        shaken = rng.normal(0.0, 0.1 * SKIN * RADIUS, (12, 3))
+        for s in (state, twin):
+            s.positions[:] += np.clip(shaken, -0.12 * SKIN * RADIUS, 0.12 * SKIN * RADIUS)
+            s.forces[:] = 0.0
+            s.torques[:] = 0.0
+        hit = press_pairs(state, pairs, law, DT)
+        expected = reference.press_pairs(twin, memory, law, DT)
+        awake = state.asleep == 0
+        np.testing.assert_allclose(state.forces[awake], twin.forces[awake], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(state.torques[awake], twin.torques[awake], rtol=1e-9, atol=1e-9)
+        assert hit == pytest.approx(expected, abs=1e-12)
+    kept = {(i, j): pairs.springs[k] for k, (i, j) in enumerate(listed(pairs, 12)) if pairs.closed[k]}
+    assert set(kept) == set(memory)
+    for pair, springs in memory.items():
+        np.testing.assert_allclose(kept[pair], springs, rtol=1e-9, atol=1e-12)
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=60, deadline=None)
+def test_forces_between_parcels_keep_linear_and_angular_momentum(
+    random_state: MakeState, laws: Laws, seed: int
+) -> None:
+    state = random_state(np.random.default_rng(seed), 12, 0.1)
+    press_pairs(state, first_list(state), laws.parcel, DT)
+    moments = np.cross(state.positions, state.forces) + state.torques
+    assert np.abs(state.forces).max() > 1.0
+    np.testing.assert_allclose(state.forces.sum(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(moments.sum(axis=0), 0.0, atol=1e-9)
+
+
+def remembered(state: State, rng: np.random.Generator) -> tuple[Pairs, dict[tuple[int, int], np.ndarray]]:
+    """Return a list whose contacts are all closed, each with a memory of its own, and those memories."""
+    pairs = first_list(state)
+    names = listed(pairs, len(state.masses))
+    pairs.closed[: len(names)] = 1
+    pairs.springs[: len(names)] = rng.normal(0.0, 1.0, (len(names), 6))
+    return pairs, {name: pairs.springs[k].copy() for k, name in enumerate(names)}
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=40, deadline=None)
+def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(
+    random_state: MakeState, make_state: MakeState, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, 20, 0.15)
+    pairs, memory = remembered(state, rng)
+    stayed = np.flatnonzero(rng.random(20) < 0.7)
+    old_rows = np.concatenate([stayed, [-1, -1, -1]]).astype(np.int64)
+    changed = make_state(np.concatenate([state.positions[stayed], rng.uniform(-0.15, 0.15, (3, 3))]))
+    changed.radii[: len(stayed)] = state.radii[stayed]
+    changed.radii[len(stayed) :] = state.radii.max()
+    count = len(old_rows)
+    new = find_pairs(changed.positions, changed.radii, changed.asleep, pairs, old_rows, room_for(count))
+    for k, (i, j) in enumerate(listed(new, count)):
+        old = memory.get((int(old_rows[i]), int(old_rows[j])))
+        if i < len(stayed) and j < len(stayed) and old is not None:
+            assert new.closed[k] == 1
+            np.testing.assert_array_equal(new.springs[k], old)
+        else:
+            assert new.closed[k] == 0
+            assert not new.springs[k].any()
+
+
+def test_memory_survives_when_more_parcels_come_than_there_was_room_for(
+    random_state: MakeState, make_state: MakeState, rng: np.random.Generator
+) -> None:
+    """Also of the last rows, after earlier ones have left."""
+    state = random_state(rng, 30, 0.1)
+    pairs, memory = remembered(state, rng)
+    stayed = np.arange(10, 30)
+    larger = enlarged(pairs, 200)
+    new = find_pairs(
+        state.positions[stayed],
+        state.radii[stayed],
+        state.asleep[stayed],
+        larger,
+        stayed,
+        room_for(200),
+    )
+    names = listed(new, 20)
+    assert len(names) > 20
+    for k, (i, j) in enumerate(names):
+        np.testing.assert_array_equal(new.springs[k], memory[int(stayed[i]), int(stayed[j])])
+
+
+@given(seed=st.integers(0, 2**16), step=st.floats(0.0, 0.5), wind=st.floats(-10.0, 10.0))
+@settings(max_examples=80, deadline=None)
+def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(
+    random_state: MakeState, seed: int, step: float, wind: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, 25, 0.25)
+    pairs = first_list(state)
+    known = set(listed(pairs, 25))
+    state.positions[:] += wind + rng.uniform(-1.0, 1.0, (25, 3)) * step * RADIUS
+    if is_outdated(state.positions, state.radii, pairs.anchors):
+        return
+    apart = np.linalg.norm(state.positions[:, None] - state.positions[None], axis=2)
+    for i, j in np.argwhere(apart < state.radii[:, None] + state.radii[None]):
+        assert i >= j or (i, j) in known
+
+
+def test_a_list_stays_valid_while_all_parcels_move_together(make_state: MakeState) -> None:
+    state = make_state([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    pairs = first_list(state)
+    state.positions[:] += 5.0
+    assert not is_outdated(state.positions, state.radii, pairs.anchors)
+    state.positions[1, 0] += 2.1 * 0.5 * SKIN * RADIUS
+    assert is_outdated(state.positions, state.radii, pairs.anchors)
