@@ -38,7 +38,7 @@ def add_grains(spec: mujoco.MjSpec) -> None:
     vertices = PARCELS_PER_SKIN * _VERTICES
     faces = _FACES + len(_CORNERS) * np.arange(grains)[:, None, None]
     for number in range(_SKINS):
-        skin = spec.add_skin(name=_name(number), material="soil", group=HIDDEN_GROUP)
+        skin = spec.add_skin(name=_name(number), material="grains", group=HIDDEN_GROUP)
         skin.vert = [0.0] * (3 * vertices)
         # Every grain shows a spot of the texture, and so has a shade of its own.
         spots = rng.uniform(size=(grains, 1, 2)) + _TEXTURE_SPOT * _CORNERS[:, :2]

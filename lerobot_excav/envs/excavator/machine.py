@@ -118,6 +118,7 @@ class ExcavatorMachine:
         box = np.array(appearance.box_rgb)
         colours = {
             "soil": appearance.soil_rgb,
+            "grains": appearance.soil_rgb,
             "machine": appearance.machine_rgb,
             "ground": appearance.ground_rgb,
             "box": box,

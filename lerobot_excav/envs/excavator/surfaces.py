@@ -17,6 +17,7 @@ BOX_SOIL_SKIN = "box_soil"
 _TERRAIN_SPACING_M = 0.1
 _BOX_SOIL_SPACING_M = 0.1
 _SKIRT_DEPTH_M = 0.05
+_GRAIN_GLOW = 0.25  # tuned by eye
 _TEXTURE_PIXELS = 128
 _TEXTURE_PERIOD_M = 2.0
 _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
@@ -24,7 +25,7 @@ _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
 
 def add_terrain(spec: mujoco.MjSpec, shape_m: tuple[float, float]) -> None:
     """Add the skin of the dig area, centred on the world origin."""
-    _add_soil_material(spec)
+    _add_soil_materials(spec)
     add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(shape_m), SURROUNDINGS_GROUP)
 
 
@@ -119,8 +120,11 @@ def add_sheet(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float6
     skin.vertweight = [[1.0] * len(vertices)]
 
 
-def _add_soil_material(spec: mujoco.MjSpec) -> None:
-    """Add the soil's material: a tileable grain that the colour of the scene multiplies."""
+def _add_soil_materials(spec: mujoco.MjSpec) -> None:
+    """Add the materials of the soil and of its single grains: a tileable grain that the colour of the scene multiplies.
+
+    Most faces of a grain turn away from the sun; without a glow of their own, falling soil would be darker than a heap.
+    """
     rng = np.random.default_rng(_TEXTURE_SEED)
     noise = rng.standard_normal((_TEXTURE_PIXELS, _TEXTURE_PIXELS))
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(_TEXTURE_PIXELS)] * 2))
@@ -129,5 +133,6 @@ def _add_soil_material(spec: mujoco.MjSpec) -> None:
     texture = spec.add_texture(name="grain", type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3)
     texture.width = texture.height = _TEXTURE_PIXELS
     texture.data = np.repeat(brightness[..., None], 3, axis=2).tobytes()
-    material = spec.add_material(name="soil", specular=0.0, shininess=0.0, reflectance=0.0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "grain"
+    for name, glow in (("soil", 0.0), ("grains", _GRAIN_GLOW)):
+        material = spec.add_material(name=name, specular=0.0, shininess=0.0, reflectance=0.0, emission=glow)
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "grain"

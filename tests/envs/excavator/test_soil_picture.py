@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.excavator.appearance import Appearance
 from lerobot_excav.envs.excavator.bodywork import LOOSE_SOIL_GROUP
 from lerobot_excav.envs.excavator.constants import TICK_S
 from lerobot_excav.envs.excavator.layout import TARGET_BOX
@@ -120,6 +121,7 @@ def test_soil_that_leaves_the_bucket_leaves_the_skin(machine, picture, soil_with
     assert not drawn(machine, "grains_0")
 
 
-def test_all_soil_has_one_material(machine):
-    model = machine.model
-    assert set(model.skin_matid) == {model.material("soil").id}
+def test_all_soil_has_the_colour_of_the_scene(machine):
+    machine.set_appearance(Appearance(soil_rgb=(0.4, 0.3, 0.2)))
+    colours = machine.model.mat_rgba[machine.model.skin_matid, :3]
+    np.testing.assert_allclose(colours, np.tile([0.4, 0.3, 0.2], (len(colours), 1)), atol=1e-6)

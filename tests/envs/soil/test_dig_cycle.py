@@ -132,7 +132,6 @@ def test_a_full_bucket_takes_no_more_and_pushes_a_heap_before_it() -> None:
 def test_the_benchmark_reports_a_plausible_cycle() -> None:
     report = real_time_factor(seed=1)
     assert 0.0 < report["p50_ms"] <= report["p95_ms"] <= report["worst_ms"]
-    assert report["idle_ms"] < report["worst_ms"]
     assert report["real_time_factor"] == pytest.approx(20.0 / report["mean_ms"])
     assert 0.0 < report["mean_awake"] <= report["mean_parcels"] <= report["most_parcels"] < 1500
     assert report["most_awake"] <= report["most_parcels"]
