@@ -115,8 +115,8 @@ EXPERIMENT = Experiment(
     "1.6 to 2.1; least near a rake of 35° to 45°",
     run=run,
     reasons={
-        "force at 90°": "The rake of the force model ends at 75°: beyond, a planar wedge demands more and more force while "
-        "in truth a wedge of dead soil forms on the blade (Miedema, ch. 11). The blade at 90° gets the force of 75°, "
-        "and the three theories are all of the planar kind or carry a layer on the blade."
+        "force at 90°": "The rake of the force model ends at 75°, since beyond it a wedge of dead soil forms on the "
+        "blade and a planar wedge over-predicts (Miedema, ch. 11). So the blade at 90° gets the force of 75°, while "
+        "the theories of the bracket go on."
     },
 )

@@ -161,8 +161,8 @@ EXPERIMENT = Experiment(
     gate="fall time (1 %, our own tolerance); drift of the centre of mass 0; energy never grows",
     run=run,
     reasons={
-        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step and "
-        "give part of it back in the next, and the sum of kinetic and potential energy leaves out what they hold "
-        "meanwhile. It never rises above its start."
+        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step "
+        "and give part of it back in the next; kinetic and potential energy leave out what they hold meanwhile. "
+        "Their sum never rises above its start."
     },
 )

@@ -27,7 +27,7 @@ def draw(plot: Plot, path: Path) -> None:
     """
     # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
     from matplotlib.figure import Figure
-    from matplotlib.ticker import ScalarFormatter
+    from matplotlib.ticker import StrMethodFormatter
 
     figure = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
     axes = figure.subplots()
@@ -37,9 +37,9 @@ def draw(plot: Plot, path: Path) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(ScalarFormatter())
-            axis.set_minor_formatter(ScalarFormatter())
-        axes.tick_params(which="minor", labelsize=7)
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(StrMethodFormatter("{x:g}"))
+        axes.tick_params(which="both", labelsize=8)
     axes.set_title(plot.title, fontsize=11)
     axes.set_xlabel(plot.x_label)
     axes.set_ylabel(plot.y_label)

@@ -3,6 +3,7 @@
 import os
 import platform
 import time
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,17 +24,17 @@ CARRY_TICKS = slice(350, 500)
 MANY_PARCELS = 1000
 """Load of the gate of a single step."""
 
-_FALL_TICKS = 40
-"""A column of parcels falls apart; all of them move and touch."""
+RUNS = 3
+
+_FALL_TICKS = 12
+"""A column of parcels falls apart: all of them touch, and few have become ground yet."""
 
 
 def run(conditions: Conditions) -> Result:
     """Time a dig cycle and the first moments of a falling column."""
-    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
-    _cycle(soil)  # compiles or loads the kernels
-    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
-    times, awake = _cycle(soil)
-    crowd, crowd_awake = _crowd(conditions)
+    times, awake = _quickest(_cycle, conditions)
+    crowd, crowd_awake = _quickest(_crowd, conditions)
+    awake_in_crowd = f"{crowd_awake.mean():.0f} awake parcels"
     carry = times[CARRY_TICKS]
     return Result(
         checks=(
@@ -46,16 +47,17 @@ def run(conditions: Conditions) -> Result:
             Check(name="95 % of the steps of a cycle", value=_percentile(times, 95), unit="ms", high=10.0),
             Check(name="half of the steps while carrying", value=_percentile(carry, 50), unit="ms", high=1.0),
             Check(
-                name=f"95 % of the steps with {crowd_awake:.0f} awake parcels",
+                name=f"95 % of the steps with {awake_in_crowd}",
                 value=_percentile(crowd, 95),
                 unit="ms",
                 high=10.0,
             ),
         ),
-        tables=(_table({"cycle": times, "carrying": carry, f"{crowd_awake:.0f} awake parcels": crowd}),),
+        tables=(_table({"cycle": times, "carrying": carry, awake_in_crowd: crowd}),),
         plots=(_plot(times, awake), *scaling_plots(conditions)),
         remarks=(
-            f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one thread computes.",
+            f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one thread computes. A step "
+            f"computes the same in every run; the quickest of {RUNS} counts, which other programs disturbed least.",
         ),
     )
 
@@ -64,14 +66,24 @@ def _percentile(values: Array, percent: float) -> float:
     return float(np.percentile(values, percent))
 
 
+def _quickest(
+    timed: Callable[[Conditions], tuple[Array, Array]], conditions: Conditions
+) -> tuple[Array, Array]:
+    """Return the least time [ms] of every step over some runs, and how many parcels were awake after it."""
+    timed(conditions)  # compiles or loads the kernels
+    times, awake = zip(*(timed(conditions) for _ in range(RUNS)), strict=True)
+    return np.min(times, axis=0), awake[0]
+
+
 def _timed_step(soil: Soil, tool: Tool | None) -> float:
     start = time.perf_counter()
     soil.step(TICK_S, tool)
     return 1e3 * (time.perf_counter() - start)
 
 
-def _cycle(soil: Soil) -> tuple[Array, Array]:
+def _cycle(conditions: Conditions) -> tuple[Array, Array]:
     """Return the time [ms] of every step of the dig cycle, and how many parcels were awake after it."""
+    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
     times, awake = [], []
     for tool in dig_cycle():
         times.append(_timed_step(soil, tool))
@@ -79,17 +91,18 @@ def _cycle(soil: Soil) -> tuple[Array, Array]:
     return np.array(times), np.array(awake, dtype=np.float64)
 
 
-def _crowd(conditions: Conditions) -> tuple[Array, float]:
-    """Return the times [ms] of the first steps of a column of parcels, and the mean number of those awake."""
+def _crowd(conditions: Conditions) -> tuple[Array, Array]:
+    """Return the times [ms] of the first steps of a column of parcels, and how many were awake after them."""
     soil = Soil(conditions.preset, (6.0, 6.0), 0.05, conditions.fidelity, conditions.seeds[0])
     rng = np.random.default_rng(conditions.seeds[0])
-    points = cylinder(0.45, 1.2, soil, rng)[:MANY_PARCELS]
+    points = cylinder(0.45, 1.3, soil, rng)
+    points = points[np.argsort(points[:, 2], kind="stable")][:MANY_PARCELS]
     soil.add_parcels(points, np.zeros_like(points))
     times, awake = [], []
     for _ in range(_FALL_TICKS):
         times.append(_timed_step(soil, None))
         awake.append(soil.awake_parcel_count)
-    return np.array(times), float(np.mean(awake))
+    return np.array(times), np.array(awake, dtype=np.float64)
 
 
 def _table(times: dict[str, Array]) -> Table:

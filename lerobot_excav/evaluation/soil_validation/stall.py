@@ -47,8 +47,7 @@ class Dig:
     """One dig with the machine.
 
     Attributes:
-        power_w: Power of the soil's resistance at the end of every tick; 0 where the soil does not touch the bucket.
-            There only the load acts, whose mass moves about within the machine.
+        power_w: Power of the soil's resistance at the end of every tick.
         force_n: Size of the soil's answer in every tick.
         edge_speed_m_s: Speed of the cutting edge in the direction in which the arm would move it.
         edge_w: (n, 3) cutting edge after every tick [m].
@@ -97,12 +96,12 @@ def dig(parameters: SoilParameters, *, fidelity: str) -> Dig:
     for number, (_, command, ticks) in enumerate(PHASES):
         for _ in range(ticks):
             ahead, before = _arm_direction(machine), machine.cutting_edge_pos_w
-            reaction = soil.step(TICK_S, machine.tool())
+            # Without its load, the soil's resistance is the only force from outside.
+            reaction = dataclasses.replace(soil.step(TICK_S, machine.tool()), payload_mass_kg=0.0)
             machine.tick(np.array(command), reaction)
             edges.append(machine.cutting_edge_pos_w)
             speeds.append(float((edges[-1] - before) @ ahead) / TICK_S)
-            touches = len(reaction.patches.limits_n) > 0
-            powers.append(external_power_w(machine) if touches else 0.0)
+            powers.append(external_power_w(machine))
             forces.append(float(np.linalg.norm(reaction.force_w_n)))
             phases.append(number)
     return Dig(
@@ -189,7 +188,8 @@ EXPERIMENT = Experiment(
     title="Stall and energy",
     source="Mechanics: resistance is no drive; friction holds what rests",
     measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
-    "soil, and in ground so hard that it stalls. Power of the soil's forces at the end of every tick.",
+    "soil, and in ground so hard that it stalls. The load is left out, so that the resistance is the only force from "
+    "outside; its power at the end of every tick.",
     gate="the soil never reverses the blade, a bucket held in it stays, and no force puts energy into the machine",
     run=run,
 )
