@@ -28,7 +28,10 @@ lerobot-eval --policy.path="$OUT/train/checkpoints/last/pretrained_model" --poli
   --env.type=excavator --env.scene_set=test --env.metrics_path="$OUT/metrics.jsonl" \
   --eval.n_episodes="$EPISODES" --eval.batch_size=1 --output_dir="$OUT/eval"
 
+[ -f "$OUT/dig.mp4" ] || lerobot-excav bench soil --video="$OUT/dig.mp4"
+
 say "Result"
 lerobot-excav report "$OUT/metrics.jsonl" --out="$OUT/report"
 echo "table:  $OUT/report"
 echo "video:  $(find "$OUT/eval" -name '*.mp4' | sort | head -1)"
+echo "film:   $OUT/dig.mp4  (the scripted operator in slow motion)"
