@@ -93,16 +93,16 @@ def test_the_blade_reproduces_the_table_of_weight_factors(rake: int, factor: flo
 
 @given(
     rake=st.floats(0.3, 1.4),
-    depth=st.floats(0.02, 0.5),
-    by=st.floats(0.2, 5.0),
+    depth=st.floats(0.02, 0.3),
+    by=st.floats(0.2, 3.0),
 )
 @settings(max_examples=30, deadline=None)
 def test_the_force_scales_with_density_width_and_square_of_depth(
     rake: float, depth: float, by: float
 ) -> None:
     once = blade_force_n(SAND, depth, rake, 0.7)
-    heavier = dataclasses.replace(SAND, density_kg_m3=SAND.density_kg_m3 * min(by, 3.0))
-    np.testing.assert_allclose(blade_force_n(heavier, depth, rake, 0.7), min(by, 3.0) * once, rtol=1e-9)
+    heavier = dataclasses.replace(SAND, density_kg_m3=SAND.density_kg_m3 * by)
+    np.testing.assert_allclose(blade_force_n(heavier, depth, rake, 0.7), by * once, rtol=1e-9)
     np.testing.assert_allclose(blade_force_n(SAND, depth, rake, 0.7 * by), by * once, rtol=1e-9)
     np.testing.assert_allclose(blade_force_n(SAND, depth * by, rake, 0.7), by**2 * once, rtol=1e-9)
 
