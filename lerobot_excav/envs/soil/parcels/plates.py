@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
-from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, dot, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 
 Array = NDArray[np.float64]
@@ -18,8 +18,10 @@ BoxNumbers = tuple[float, float, float, float, float, float, float, float]
 NO_BOX: BoxNumbers = (0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 1.0, 0.0)
 
 CLOSEST = 0.25
-"""Share of its radius to which a parcel's centre may come near to a plate; there it is put back. Within one
-sub-step no parcel moves as far, so none passes through."""
+"""Share of its radius to which a parcel's centre may come near to a plate; there it is put back."""
+
+LARGEST_APPROACH = 0.8
+"""Share of its distance from a plate that a parcel may come nearer within a sub-step, so that none passes through."""
 
 _HAIR_M = 1e-9
 
@@ -102,6 +104,33 @@ def nearest_on_plate(profile: Array, planes: Array, half_width: float, plate: in
 
 
 @kernel
+def keep_out(state: State, i: int, normal: Vector, gap: float, velocity: Vector, dt: float) -> Vector:
+    """Put a parcel that came too near to a plate back, and take the speed with which it would pass through.
+
+    Args:
+        state: All parcels, changed in place.
+        i: Which one.
+        normal: Unit normal towards it.
+        gap: Distance of its centre from the plate [m].
+        velocity: Of its centre relative to the plate [m/s].
+        dt: Duration [s].
+
+    Returns:
+        The relative velocity that is left [m/s].
+    """
+    back = max(0.0, CLOSEST * state.radii[i] - gap)
+    excess = max(0.0, -dot(velocity, normal) - LARGEST_APPROACH * (gap + back) / dt)
+    for a in range(3):
+        state.positions[i, a] += back * normal[a]
+        state.velocities[i, a] += excess * normal[a]
+    return (
+        velocity[0] + excess * normal[0],
+        velocity[1] + excess * normal[1],
+        velocity[2] + excess * normal[2],
+    )
+
+
+@kernel
 def bucket_reach(tool: ToolPath) -> float:
     """Return how far the bucket's corners are from its origin [m]."""
     reach = 0.0
@@ -111,77 +140,69 @@ def bucket_reach(tool: ToolPath) -> float:
 
 
 @kernel
-def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
-    """Add the forces of the bucket's plates on the awake parcels, and note which touch one from outside.
+def _wall_velocity(rotation: Array, linear: Array, angular: Array, c: Vector) -> Vector:
+    """Return the velocity [m/s] of a tool point."""
+    turning = cross((angular[0], angular[1], angular[2]), turned(rotation, c))
+    return linear[0] + turning[0], linear[1] + turning[1], linear[2] + turning[2]
 
-    Parcels deep inside are marked as sheltered (`shell` 2): there is no ground for them.
+
+@kernel
+def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
+    """Add the forces of the bucket's plates on the awake parcels, and note where each is at the bucket.
 
     Args:
         state: All parcels, changed in place.
         step: Which sub-step.
         tool: The bucket.
-        opening_margin: A parcel this far behind the opening is deep inside [m].
+        opening_margin: A parcel this far behind the opening is sheltered: there is no ground for it [m].
         law: Coefficients of the contact with steel.
         dt: Duration [s].
     """
     position, rotation = tool.positions[step], tool.rotations[step]
-    linear, planes, profile, half_width = tool.linear, tool.planes, tool.profile, tool.half_width
+    # Plain arrays: taking one out of a named tuple costs more than the contact.
+    planes, profile, half_width = tool.planes, tool.profile, tool.half_width
+    linear, angular = tool.linear, tool.angular
+    positions, velocities, spins, radii = state.positions, state.velocities, state.spins, state.radii
     near_plate, shell, forces, torques = state.near_plate, state.shell, state.forces, state.torques
-    angular = (tool.angular[0], tool.angular[1], tool.angular[2])
-    positions, velocities, spins = state.positions, state.velocities, state.spins
+    asleep, masses = state.asleep, state.masses
     plates = state.plate_springs.shape[1]
     springs = state.plate_springs.reshape((-1, SPRINGS))
     reach = bucket_reach(tool)
-    sides = len(tool.profile) + 1
-    for i in range(len(state.masses)):
+    for i in range(len(radii)):
         shell[i] = OFF_BUCKET
-        if state.asleep[i]:
-            continue
-        r = state.radii[i]
+        r = radii[i]
         q = to_tool(position, rotation, positions[i, 0], positions[i, 1], positions[i, 2])
-        if q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + 2.0 * r) ** 2:  # 1 r more: see to old contacts
+        if asleep[i] or q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + r) ** 2:
             continue
         depth = inside_depth(planes, 1, q)
-        if depth > 0.0 and inside_depth(planes[:1], 0, q) > opening_margin:
+        behind = planes[0, 3] - planes[0, 0] * q[0] - planes[0, 2] * q[2]  # the opening
+        if depth > 0.0 and behind > opening_margin:
             shell[i] = SHELTERED
         if depth >= r and not near_plate[i]:
             continue
         near_plate[i] = 0
-        for plate in range(sides):
+        for plate in range(len(profile) + 1):
             row = i * plates + plate
-            n0, n1, n2, d = (
-                planes[plate + 1, 0],
-                planes[plate + 1, 1],
-                planes[plate + 1, 2],
-                planes[plate + 1, 3],
-            )
-            side = n0 * q[0] + n1 * q[1] + n2 * q[2] - d
+            p = planes[plate + 1]
+            side = p[0] * q[0] + p[1] * q[1] + p[2] * q[2] - p[3]
             if abs(side) >= r:
                 forget(springs, row)
                 continue
             c = nearest_on_plate(profile, planes, half_width, plate, q)
-            away_t = (q[0] - c[0], q[1] - c[1], q[2] - c[2])
-            gap = math.sqrt(away_t[0] ** 2 + away_t[1] ** 2 + away_t[2] ** 2)
+            gap = math.sqrt((q[0] - c[0]) ** 2 + (q[1] - c[1]) ** 2 + (q[2] - c[2]) ** 2)
             if gap >= r or gap < _HAIR_M:
                 forget(springs, row)
                 continue
             near_plate[i] = 1
             if side > 0.0:
                 shell[i] = OUTSIDE_OF_SHELL
-            away = turned(rotation, away_t)
-            normal = (away[0] / gap, away[1] / gap, away[2] / gap)
-            if gap < CLOSEST * r:
-                for a in range(3):
-                    positions[i, a] += (CLOSEST * r - gap) * normal[a]
-            turning = cross(angular, turned(rotation, c))
-            velocity = (
-                velocities[i, 0] - linear[0] - turning[0],
-                velocities[i, 1] - linear[1] - turning[1],
-                velocities[i, 2] - linear[2] - turning[2],
-            )
-            spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt)
+            n = turned(rotation, ((q[0] - c[0]) / gap, (q[1] - c[1]) / gap, (q[2] - c[2]) / gap))
+            wall = _wall_velocity(rotation, linear, angular, c)
+            v = (velocities[i, 0] - wall[0], velocities[i, 1] - wall[1], velocities[i, 2] - wall[2])
+            w = (spins[i, 0], spins[i, 1], spins[i, 2])
+            force, torque = wall_contact(springs, row, n, gap, v, w, masses[i], r, law, dt)
             for a in range(3):
+                positions[i, a] += max(0.0, CLOSEST * r - gap) * n[a]
                 forces[i, a] += force[a]
                 torques[i, a] += torque[a]
 
@@ -227,10 +248,8 @@ def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) ->
                 forget(springs, row)
                 continue
             normal = ((box[6] * du - box[7] * dv) / gap, (box[7] * du + box[6] * dv) / gap, dz / gap)
-            if gap < CLOSEST * r:
-                for a in range(3):
-                    positions[i, a] += (CLOSEST * r - gap) * normal[a]
             velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
+            velocity = keep_out(state, i, normal, gap, velocity, dt)
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
             force, torque = wall_contact(
                 springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
