@@ -49,7 +49,7 @@ def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
         entry_along_m=rng.uniform(0.0, 0.16),
         entry_across_m=rng.uniform(-0.1, 0.1),
         depth_m=rng.uniform(0.36, 0.46),
-        attack_pitch_rad=rng.uniform(-1.75, -1.45),
+        attack_pitch_rad=rng.uniform(-1.5, -1.3),
         # A flat bucket holds little more than this; the curl takes the rest.
         cut_volume_m3=rng.uniform(0.34, 0.46),
         roll_in_pitch_rad=rng.uniform(-2.85, -2.6),
