@@ -104,25 +104,36 @@ def nearest_on_plate(profile: Array, planes: Array, half_width: float, plate: in
 
 
 @kernel
-def keep_out(state: State, i: int, normal: Vector, gap: float, velocity: Vector, dt: float) -> Vector:
+def keep_out(
+    positions: Array,
+    velocities: Array,
+    i: int,
+    normal: Vector,
+    gap: float,
+    radius: float,
+    velocity: Vector,
+    dt: float,
+) -> Vector:
     """Put a parcel that came too near to a plate back, and take the speed with which it would pass through.
 
     Args:
-        state: All parcels, changed in place.
-        i: Which one.
+        positions: (n, 3) of all parcels [m], changed in place.
+        velocities: (n, 3) of all parcels [m/s], changed in place.
+        i: Which parcel.
         normal: Unit normal towards it.
         gap: Distance of its centre from the plate [m].
+        radius: Its radius [m].
         velocity: Of its centre relative to the plate [m/s].
         dt: Duration [s].
 
     Returns:
         The relative velocity that is left [m/s].
     """
-    back = max(0.0, CLOSEST * state.radii[i] - gap)
+    back = max(0.0, CLOSEST * radius - gap)
     excess = max(0.0, -dot(velocity, normal) - LARGEST_APPROACH * (gap + back) / dt)
     for a in range(3):
-        state.positions[i, a] += back * normal[a]
-        state.velocities[i, a] += excess * normal[a]
+        positions[i, a] += back * normal[a]
+        velocities[i, a] += excess * normal[a]
     return (
         velocity[0] + excess * normal[0],
         velocity[1] + excess * normal[1],
@@ -172,7 +183,8 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
         shell[i] = OFF_BUCKET
         r = radii[i]
         q = to_tool(position, rotation, positions[i, 0], positions[i, 1], positions[i, 2])
-        if asleep[i] or q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + r) ** 2:
+        # One radius more than touching: contacts that have opened are seen, and forgotten.
+        if asleep[i] or q[0] * q[0] + q[1] * q[1] + q[2] * q[2] > (reach + 2.0 * r) ** 2:
             continue
         depth = inside_depth(planes, 1, q)
         behind = planes[0, 3] - planes[0, 0] * q[0] - planes[0, 2] * q[2]  # the opening
@@ -199,10 +211,10 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
             n = turned(rotation, ((q[0] - c[0]) / gap, (q[1] - c[1]) / gap, (q[2] - c[2]) / gap))
             wall = _wall_velocity(rotation, linear, angular, c)
             v = (velocities[i, 0] - wall[0], velocities[i, 1] - wall[1], velocities[i, 2] - wall[2])
+            v = keep_out(positions, velocities, i, n, gap, r, v, dt)
             w = (spins[i, 0], spins[i, 1], spins[i, 2])
             force, torque = wall_contact(springs, row, n, gap, v, w, masses[i], r, law, dt)
             for a in range(3):
-                positions[i, a] += max(0.0, CLOSEST * r - gap) * n[a]
                 forces[i, a] += force[a]
                 torques[i, a] += torque[a]
 
@@ -249,7 +261,7 @@ def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) ->
                 continue
             normal = ((box[6] * du - box[7] * dv) / gap, (box[7] * du + box[6] * dv) / gap, dz / gap)
             velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
-            velocity = keep_out(state, i, normal, gap, velocity, dt)
+            velocity = keep_out(positions, velocities, i, normal, gap, r, velocity, dt)
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
             force, torque = wall_contact(
                 springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt

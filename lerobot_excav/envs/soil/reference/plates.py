@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.contact import Law
-from lerobot_excav.envs.soil.parcels.plates import CLOSEST, BoxNumbers, ToolPath
+from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxNumbers, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 from lerobot_excav.envs.soil.reference.contact import wall_contact
 
@@ -93,7 +93,10 @@ def _press(state: State, i: int, plate: int, away: Array, velocity: Array, law: 
         springs[:] = 0.0
         return False
     normal = away / gap
-    state.positions[i] += max(0.0, CLOSEST * radius - gap) * normal
+    back = max(0.0, CLOSEST * radius - gap)
+    closing = -float((state.velocities[i] - velocity) @ normal)
+    state.positions[i] += back * normal
+    state.velocities[i] += max(0.0, closing - LARGEST_APPROACH * (gap + back) / dt) * normal
     force, torque = wall_contact(
         springs,
         normal,

@@ -37,7 +37,7 @@ def copy(state: State) -> State:
 
 
 def assert_same(state: State, twin: State) -> None:
-    for name in ("positions", "forces", "torques", "plate_springs", "ground_springs"):
+    for name in ("positions", "velocities", "forces", "torques", "plate_springs", "ground_springs"):
         np.testing.assert_allclose(
             getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name
         )
