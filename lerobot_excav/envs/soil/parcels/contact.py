@@ -35,6 +35,9 @@ NORMAL_DAMPING = 0.5
 TANGENTIAL_DAMPING = 0.2
 """Damping ratio of sliding and rolling springs (tuned: stable with a dozen contacts)."""
 
+LARGEST_PHASE = 0.4
+"""Largest phase of the normal spring per sub-step [rad]: what is too light for its stiffness has a softer contact."""
+
 _TANGENTIAL_IMPEDANCE = math.sqrt(TANGENTIAL_STIFFNESS)
 
 
@@ -175,9 +178,10 @@ def contact(
     Returns:
         Force on the first partner; rolling force q, whose torque on the first partner is r n x q.
     """
-    impedance = math.sqrt(law.stiffness * mass)
-    pressing = normal_force(overlap, dot(velocity, normal), law.stiffness, impedance, radius)
-    stiffness = TANGENTIAL_STIFFNESS * law.stiffness
+    normal_stiffness = min(law.stiffness, mass * (LARGEST_PHASE / dt) ** 2)
+    impedance = math.sqrt(normal_stiffness * mass)
+    pressing = normal_force(overlap, dot(velocity, normal), normal_stiffness, impedance, radius)
+    stiffness = TANGENTIAL_STIFFNESS * normal_stiffness
     damping = 2.0 * TANGENTIAL_DAMPING * _TANGENTIAL_IMPEDANCE * impedance
     slide = spring_force(springs, row, 0, normal, velocity, stiffness, damping, law.sliding * pressing, dt)
     roll = spring_force(

@@ -12,7 +12,7 @@ from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, fo
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket
-from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, State
+from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State
 
 Array = NDArray[np.float64]
 
@@ -170,6 +170,7 @@ def advance(
     same_rows = np.arange(len(state.masses))
     walls = len(tool.profile) + 1
     hit = 0.0
+    state.ground[:] = TOUCHES_NOTHING
     for step in range(steps):
         if tool.present:
             _carry(state, tool, step)

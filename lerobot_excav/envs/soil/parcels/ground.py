@@ -14,7 +14,6 @@ from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
     TOUCHES_BOX_FLOOR,
     TOUCHES_GROUND,
-    TOUCHES_NOTHING,
     TOUCHES_OUTSIDE,
     State,
 )
@@ -96,21 +95,22 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
         dt: Duration [s].
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
-    springs = state.ground_springs
+    springs, on_ground = state.ground_springs, state.on_ground
     for i in range(len(state.masses)):
         r = state.radii[i]
-        touched = state.ground[i]
-        state.ground[i] = TOUCHES_NOTHING
         if state.asleep[i] or state.shell[i] == SHELTERED or positions[i, 2] > highest + r:
-            if touched != TOUCHES_NOTHING:
+            if on_ground[i]:
+                on_ground[i] = 0
                 forget(springs, i)
             continue
         place, height, normal = ground_below(site, positions[i, 0], positions[i, 1])
         gap = (positions[i, 2] - height) * normal[2]  # distance from the tangent plane
         if gap >= r:
-            if touched != TOUCHES_NOTHING:
+            if on_ground[i]:
+                on_ground[i] = 0
                 forget(springs, i)
             continue
+        on_ground[i] = 1
         state.ground[i] = place
         if gap < LEAST_GAP * r:
             lift = min(LEAST_GAP * r - gap, LIFT * r)

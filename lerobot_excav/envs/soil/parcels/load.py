@@ -24,14 +24,15 @@ LOOKS_UP = 0.3
 LEAVING_M_S = 1.0
 """Speed in the bucket above which a parcel over the opening has left the heap (guess)."""
 
-RESTING_SPEED_M_S = 0.05
-"""Root mean square speed in the bucket below which a load is at rest (soil.md: 0.05 m/s)."""
+RESTING_SPEED_M_S = 0.08
+"""Root mean square speed in the bucket below which a load is at rest (tuned: a load that shakes with the machine)."""
 
-RESTING_TIME_S = 0.2
+RESTING_TIME_S = 0.1
 """How long it stays so before it falls asleep."""
 
-WAKING_TILT_RAD = math.radians(3.0)
-"""Change of the direction of weight, in the bucket, that wakes a load."""
+WAKING_TILT_RAD = math.radians(6.0)
+"""Change of the direction of weight, in the bucket, that wakes a load (guess: sand starts to slide a few degrees above
+the slope at which it stops)."""
 
 _ACCELERATION_TIME_S = 0.1
 """Time constant of the measured acceleration: the machine's vibration does not wake a load (guess)."""

@@ -36,7 +36,8 @@ class State(NamedTuple):
         calm_s: (n,) how long each has rested on the ground [s].
         asleep: (n,) 1 if it rests in the bucket and moves with it.
         load: (n,) 1 if it belongs to the bucket's load.
-        ground: (n,) what it touches below, one of `TOUCHES_…`.
+        ground: (n,) what it last touched below in this step, one of `TOUCHES_…`.
+        on_ground: (n,) 1 if it touches the ground in this sub-step.
         shell: (n,) where it is at the bucket, one of `OFF_BUCKET`, `OUTSIDE_OF_SHELL`, `SHELTERED`.
         near_plate: (n,) 1 if it touched a plate of the bucket when last looked at.
         ground_springs: (n, 6) memory of the contact with the ground [m].
@@ -55,6 +56,7 @@ class State(NamedTuple):
     asleep: Flags
     load: Flags
     ground: Flags
+    on_ground: Flags
     shell: Flags
     near_plate: Flags
     ground_springs: Array
@@ -76,6 +78,7 @@ def empty_state(count: int, plates: int) -> State:
         asleep=np.zeros(count, dtype=np.uint8),
         load=np.zeros(count, dtype=np.uint8),
         ground=np.zeros(count, dtype=np.uint8),
+        on_ground=np.zeros(count, dtype=np.uint8),
         shell=np.zeros(count, dtype=np.uint8),
         near_plate=np.zeros(count, dtype=np.uint8),
         ground_springs=np.zeros((count, 6)),
@@ -113,6 +116,7 @@ def keep(state: State, kept: Flags) -> int:
             state.asleep[count] = state.asleep[i]
             state.load[count] = state.load[i]
             state.ground[count] = state.ground[i]
+            state.on_ground[count] = state.on_ground[i]
             state.shell[count] = state.shell[i]
             state.near_plate[count] = state.near_plate[i]
             state.ground_springs[count] = state.ground_springs[i]
