@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
+    LARGEST_PHASE,
     NORMAL_DAMPING,
     SEPARATION_M_S,
     TANGENTIAL_DAMPING,
@@ -53,8 +54,9 @@ def contact(
     dt: float,
 ) -> tuple[Array, Array]:
     """Return the force on the first partner and the rolling force [N]; (6,) springs are changed in place."""
-    pressing = normal_force(overlap, float(velocity @ normal), law.stiffness, mass, radius)
-    stiffness = TANGENTIAL_STIFFNESS * law.stiffness
+    normal_stiffness = min(law.stiffness, mass * (LARGEST_PHASE / dt) ** 2)
+    pressing = normal_force(overlap, float(velocity @ normal), normal_stiffness, mass, radius)
+    stiffness = TANGENTIAL_STIFFNESS * normal_stiffness
     damping = 2.0 * TANGENTIAL_DAMPING * math.sqrt(stiffness * mass)
     slide, springs[:3] = stretch(
         springs[:3], normal, velocity, stiffness, damping, law.sliding * pressing, dt

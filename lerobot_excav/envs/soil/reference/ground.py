@@ -10,7 +10,6 @@ from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
     TOUCHES_BOX_FLOOR,
     TOUCHES_GROUND,
-    TOUCHES_NOTHING,
     TOUCHES_OUTSIDE,
     State,
 )
@@ -60,9 +59,10 @@ def press_ground(state: State, site: Site, law: Law, dt: float) -> None:
         gap, radius = float((state.positions[i, 2] - height) * normal[2]), float(state.radii[i])
         springs = state.ground_springs[i]
         if state.asleep[i] or state.shell[i] == SHELTERED or gap >= radius:
-            state.ground[i] = TOUCHES_NOTHING
+            state.on_ground[i] = 0
             springs[:] = 0.0
             continue
+        state.on_ground[i] = 1
         state.ground[i] = place
         state.positions[i] += float(np.clip(LEAST_GAP * radius - gap, 0.0, LIFT * radius)) * normal
         force, torque = wall_contact(

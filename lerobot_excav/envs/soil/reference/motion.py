@@ -7,7 +7,7 @@ from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, Laws
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
-from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, State
+from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State
 from lerobot_excav.envs.soil.reference.ground import press_ground
 from lerobot_excav.envs.soil.reference.pairs import Memory, press_pairs
 from lerobot_excav.envs.soil.reference.plates import press_box, press_bucket
@@ -40,6 +40,7 @@ def advance(
 ) -> float:
     """Advance all parcels by some sub-steps; return the fastest hit on a sleeping parcel [m/s]."""
     hit = 0.0
+    state.ground[:] = TOUCHES_NOTHING
     for step in range(steps):
         state.forces[:] = 0.0
         state.torques[:] = 0.0

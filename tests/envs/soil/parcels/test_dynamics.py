@@ -225,7 +225,8 @@ def test_what_contacts_remember_outlives_new_lists_of_neighbours(
     The twin has no list: it looks at all pairs and forgets only what opens.
     """
     lump = 1.98 * RADIUS * np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    state = make_state(np.concatenate([lump, lump + [0.3, 0.25, 0.0]]) + [0.0, 0.0, 2.0])
+    lump[:, 2] += 2.0
+    state = make_state(np.concatenate([lump, lump + np.array([0.3, 0.25, 0.0])]))
     state.velocities[:8] = [4.0, 0.0, 0.0]
     state.velocities[:] += rng.normal(0.0, 0.05, (16, 3))
     state.spins[:] = rng.normal(0.0, 2.0, (16, 3))
@@ -364,3 +365,20 @@ def test_a_crowd_at_one_place_comes_apart_below_the_speed_limit(
     assert fastest <= LARGEST_SPEED_M_S * 1.1  # against their mean
     assert apart > 1.9 * RADIUS
     assert np.abs(state.velocities[:, :2].mean(axis=0)).max() < 0.2
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3, 0.1, 0.03, 1e-2, 1e-4, 1e-8])
+def test_a_light_remainder_lands_as_softly_as_a_whole_parcel(
+    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, share: float
+) -> None:
+    """A stiffness made for whole parcels would shoot it to the sky."""
+    radius = RADIUS * share ** (1.0 / 3.0)
+    state = make_state([[0.0, 0.0, 0.5]], radii=radius, masses=MASS * share)
+    energies = [energy(state)]
+    for _ in range(900):
+        run(state, no_tool(1), site(), laws, 1)
+        energies.append(energy(state))
+    assert max(energies) == energies[0]
+    assert max(energies[400:]) < 0.1 * energies[0]
+    assert state.positions[0, 2] < RADIUS
+    assert np.linalg.norm(state.velocities[0]) < 0.01

@@ -14,7 +14,6 @@ from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
     TOUCHES_BOX_FLOOR,
     TOUCHES_GROUND,
-    TOUCHES_NOTHING,
     TOUCHES_OUTSIDE,
     State,
 )
@@ -104,18 +103,20 @@ def test_the_ground_presses_parcels_as_the_reference_does(
         for name in ("positions", "forces", "torques", "ground_springs"):
             np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(state.ground, twin.ground)
+        np.testing.assert_array_equal(state.on_ground, twin.on_ground)
 
 
-def test_a_parcel_that_leaves_the_ground_touches_nothing_and_remembers_nothing(
+def test_a_parcel_that_leaves_the_ground_remembers_nothing(
     make_state: MakeState, site: MakeSite, laws: Laws
 ) -> None:
     state = make_state([[0.0, 0.0, 0.04]], velocities=[[1.0, 0.0, 0.0]])
     press_ground(state, site(), 0.0, laws.ground, DT)
+    assert state.on_ground[0] == 1
     assert state.ground[0] == TOUCHES_GROUND
     assert state.ground_springs.any()
     state.positions[0, 2] = 0.1
     press_ground(state, site(), 0.0, laws.ground, DT)
-    assert state.ground[0] == TOUCHES_NOTHING
+    assert state.on_ground[0] == 0
     assert not state.ground_springs.any()
 
 

@@ -166,8 +166,9 @@ def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(
     plates = reference.bucket_polygons(tool)
     state = make_state([tool.rotations[0] @ point])
     before = [np.array(point) - reference.nearest_point(plate, np.array(point)) for plate in plates]
-    if sum(np.linalg.norm(away) < RADIUS for away in before) != 1:
-        return  # in a corner, plates push one after the other
+    gaps = np.array([np.linalg.norm(away) for away in before])
+    if (gaps < RADIUS).sum() != 1 or gaps.min() < 1e-6:
+        return  # in a corner, plates push one after the other; exactly on a plate, there is no side
     point_t = pressed(state, tool, laws).positions[0] @ tool.rotations[0]
     for plate, away in zip(plates, before, strict=True):
         after = point_t - reference.nearest_point(plate, point_t)
