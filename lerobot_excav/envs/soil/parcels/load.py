@@ -40,7 +40,7 @@ _ACCELERATION_TIME_S = 0.1
 
 @kernel
 def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
-    """Mark the parcels that lie in the bucket or in the heap above its opening.
+    """Mark the parcels that lie in the bucket or in the heap above its opening and its rim.
 
     Args:
         state: All parcels; `load` is changed.
@@ -70,9 +70,9 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
         state.load[i] = 0
         if above <= 0.0:
             state.load[i] = 1 if inside_depth(tool.planes, 1, q) > 0.0 else 0
-        elif above < LARGEST_HEAP_M and up > LOOKS_UP and abs(q[1]) < tool.half_width:
+        elif above < LARGEST_HEAP_M and up > LOOKS_UP and abs(q[1]) < tool.half_width + state.radii[i]:
             along = (q[0] - first[0]) * (last[0] - first[0]) + (q[2] - first[1]) * (last[1] - first[1])
-            over = 0.0 < along < length * length
+            over = abs(along / length - 0.5 * length) < 0.5 * length + state.radii[i]
             state.load[i] = 1 if over and speed < LEAVING_M_S**2 else 0
         if state.load[i]:
             mass += state.masses[i]

@@ -168,8 +168,11 @@ class Population:
             self._rest.update(self.state, tool, dt_s, hit, cutting=cutting)
 
     def freeze_load(self, tool: ToolPath) -> None:
-        """Let the load sleep in a bucket that goes away, wherever that will come back."""
+        """Let the load sleep in a bucket that goes away, wherever that will come back; until then it stands still."""
         put_to_sleep(self.state, tool)
+        sleeping = self.state.asleep == 1
+        self.state.velocities[sleeping] = 0.0
+        self.state.spins[sleeping] = 0.0
         self._rest.clear()
 
     def settle(self, dt_s: float) -> Landed:
