@@ -44,8 +44,8 @@ class SoilParameters:
     parcel_solid_fraction: float = 0.56
     parcel_sliding_scale: float = 0.62
     parcel_rolling_scale: float = 0.37
-    ground_sliding_scale: float = 1.2
-    ground_rolling_scale: float = 0.75
+    ground_sliding_scale: float = 1.6
+    ground_rolling_scale: float = 1.2
     penetration_scale: float = 1.0
 
     def __post_init__(self) -> None:
@@ -94,10 +94,14 @@ PROVENANCE = {
     "parcel_solid_fraction": Provenance(
         unit="1", source="parcels poured gently into a bucket pack to 0.56", kind="tuned"
     ),
-    "parcel_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "parcel_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "ground_sliding_scale": Provenance(unit="1", source="column collapse (T1)", kind="tuned"),
-    "ground_rolling_scale": Provenance(unit="1", source="column collapse (T1)", kind="tuned"),
+    "parcel_sliding_scale": Provenance(
+        unit="1", source="0.5 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
+    ),
+    "parcel_rolling_scale": Provenance(
+        unit="1", source="0.3 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
+    ),
+    "ground_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
+    "ground_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
     "penetration_scale": Provenance(unit="1", source="bearing theory as it is", kind="guess"),
 }
 """Source of each field of `SoilParameters`."""
