@@ -187,6 +187,11 @@ def _plot(heaps: list[Heap]) -> Plot:
     )
 
 
+SLOPE_OF_PARCELS = (
+    "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the height "
+    "field only take what is steeper than the preset's angle; they cannot steepen a flank."
+)
+
 EXPERIMENT = Experiment(
     code="T3",
     title="Heap and repose",
@@ -196,9 +201,5 @@ EXPERIMENT = Experiment(
     "pours with different seeds; every soil.",
     gate="the preset's angle ± 2° in 8 azimuths; mass error below 1e-9",
     run=run,
-    reasons={
-        start: "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the "
-        "height field only take what is steeper than the preset's angle; they cannot steepen a flank."
-        for start in ("gentlest flank", "steepest flank")
-    },
+    reasons=dict.fromkeys(("gentlest flank", "steepest flank"), SLOPE_OF_PARCELS),
 )

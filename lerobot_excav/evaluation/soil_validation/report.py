@@ -56,7 +56,7 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
     command = "lerobot-excav bench soil --report"
     return (
         "# Soil against published experiments\n\n"
-        f"Written by `{command}`; nothing here is typed by hand. {total - missed} of {total} gated values are inside "
+        f"Written by `{command}`; do not edit it. {total - missed} of {total} gated values are inside "
         "their gates"
         + (
             ", all of them.\n\n"

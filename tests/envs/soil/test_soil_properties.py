@@ -16,7 +16,7 @@ TICKS = 120
 GOAL_TICKS = 40
 CELL_M = 0.1
 EXTENT_M = 3.0
-NEAREST_PLATE = 0.15
+NEAREST_PLATE = 0.2
 """Smallest distance of a parcel's centre to a plate, as a share of its radius: steel never gets past the centre."""
 
 seeds = st.integers(0, 2**32 - 1)
@@ -62,18 +62,25 @@ def swung(tool, yaw_rad, yaw_rate):
     )
 
 
-def random_motion(rng):
-    """Yield tools that go from goal to goal, turning and swinging, above the rigid floor; no speed ever jumps."""
+START = np.array([0.8, 0.0, 1.3, math.radians(-100.0), 0.0])
+DUMPED = np.array([1.0, 0.0, 1.6, 0.0, 0.0])
+"""Edge, pitch and yaw."""
+
+
+def random_goals(rng):
+    """Return goals of the bucket above the rigid floor, the first of them where it starts."""
+    low, high = (-1.2, -0.5, 0.1, -3.3, -1.5), (1.0, 0.5, 1.2, 0.0, 1.5)
+    return [START, *rng.uniform(low, high, (TICKS // GOAL_TICKS, 5))]
+
+
+def motion(goals):
+    """Yield tools that go from goal to goal, turning and swinging; no speed ever jumps."""
     duration = GOAL_TICKS * TICK_S
-    at = np.array([0.8, 0.0, 1.3, math.radians(-100.0), rng.uniform(-3.0, 3.0)])  # edge, pitch, yaw
-    for _ in range(TICKS // GOAL_TICKS):
-        goal = np.array([rng.uniform(-1.2, 1.0), rng.uniform(-0.5, 0.5), rng.uniform(0.1, 1.2), 0.0, 0.0])
-        goal[3:] = rng.uniform(-3.3, 0.0), at[4] + rng.uniform(-0.8, 0.8)
+    for start, end in itertools.pairwise(goals):
         for share in np.arange(1, GOAL_TICKS + 1) / GOAL_TICKS:
-            now = at + (3.0 * share**2 - 2.0 * share**3) * (goal - at)
-            rate = 6.0 * share * (1.0 - share) / duration * (goal - at)
+            now = start + (3.0 * share**2 - 2.0 * share**3) * (end - start)
+            rate = 6.0 * share * (1.0 - share) / duration * (end - start)
             yield swung(tool_at(now[:3], now[3], rate[:3], rate[3]), now[4], rate[4])
-        at = goal
 
 
 def to_segment(points, start, end):
@@ -142,7 +149,7 @@ def test_any_motion_keeps_the_books_and_leaves_no_parcel_in_a_plate(preset, fide
     floor_depth_m = float(rng.choice([0.0, 0.3]))
     soil = random_soil(preset, fidelity, rng, floor_depth_m)
     total = sum(soil.ledger_kg().values())
-    for tool in random_motion(rng):
+    for tool in motion(random_goals(rng)):
         reaction = soil.step(TICK_S, tool)
         assert_sound(soil, total)
         assert np.isfinite([*reaction.force_w_n, *reaction.torque_w_nm, *reaction.payload_com_t]).all()
@@ -160,15 +167,19 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
     rng = np.random.default_rng(seed)
     soil = random_soil(preset, fidelity, rng, 0.0)
     total = sum(soil.ledger_kg().values())
-    for tool in random_motion(rng):
+    for tool in motion([*random_goals(rng), DUMPED, DUMPED, DUMPED]):
         soil.step(TICK_S, tool)
     before = b""
     for _ in range(3000):
-        soil.step(TICK_S)  # the bucket is gone with its load; all else comes to rest
-        if soil.parcel_is_load.all() and soil.heights_m.tobytes() == before:
+        soil.step(TICK_S)
+        speed = np.abs(soil.parcel_velocities_w).max(
+            initial=0.0
+        )  # one may be left that lies on the rim of the box
+        if speed < 0.01 and soil.heights_m.tobytes() == before:
             break
         before = soil.heights_m.tobytes()
-    assert soil.parcel_is_load.all()
+    assert speed < 0.01
+    assert soil.heights_m.tobytes() == before
     assert_sound(soil, total)
     assert steepest(soil.heights_m) <= soil.parameters.slope_tan + REST_TAN + 1e-9
 

@@ -25,7 +25,12 @@ def test_parcels_of_a_column_neither_overlap_nor_start_in_the_floor(seed, radius
 
 def test_a_column_has_the_bulk_density():
     soil = Soil()
-    layer = 2.0 * soil.parcel_radius_m * math.cbrt(math.pi / math.sqrt(18.0) / 0.60) * math.sqrt(2.0 / 3.0)
+    layer = (
+        2.0
+        * soil.parcel_radius_m
+        * math.cbrt(math.pi / math.sqrt(18.0) / soil.parameters.parcel_solid_fraction)
+        * math.sqrt(2.0 / 3.0)
+    )
     counts = [len(cylinder(0.5, 5 * layer, soil, np.random.default_rng(seed))) for seed in range(20)]
     found = np.mean(counts) * soil.parcel_mass_kg / (math.pi * 0.5**2 * 5 * layer)
     assert found == pytest.approx(soil.density_kg_m3, rel=0.01)
