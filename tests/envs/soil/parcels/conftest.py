@@ -114,7 +114,7 @@ def site() -> Callable[..., Site]:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_population(laws: Laws) -> Callable[..., Population]:
     """Return a maker of empty populations."""
 

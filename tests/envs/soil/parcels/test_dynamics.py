@@ -300,7 +300,7 @@ def crosses(polygon: np.ndarray, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_no_parcel_passes_a_plate_at_the_largest_speed(
     make_state: MakeState, tool_path: MakeTool, site: MakeSite, laws: Laws, seed: int
 ) -> None:

@@ -1,0 +1,300 @@
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil.benchmark import BUCKET
+from lerobot_excav.envs.soil.parcels import population as module
+from lerobot_excav.envs.soil.parcels.dynamics import Laws
+from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.plates import ToolPath
+from lerobot_excav.envs.soil.parcels.population import (
+    SETTLING_SPEED_M_S,
+    SETTLING_TIME_S,
+    Landed,
+    Population,
+)
+from lerobot_excav.envs.soil.parcels.store import (
+    OUTSIDE_OF_SHELL,
+    TOUCHES_BOX_FLOOR,
+    TOUCHES_GROUND,
+    TOUCHES_NOTHING,
+    TOUCHES_OUTSIDE,
+    State,
+)
+from lerobot_excav.envs.soil.reference import motion as reference
+from lerobot_excav.envs.soil.reference.pairs import Memory
+
+RADIUS = 0.045
+MASS = 0.94
+TICK = 0.02
+STEPS = 20
+
+MakePopulation = Callable[..., Population]
+MakeTool, MakeSite, NoTool = Callable[..., ToolPath], Callable[..., Site], Callable[[int], ToolPath]
+
+
+def add(population: Population, positions: Any, velocities: Any = None, masses: Any = None) -> None:
+    points = np.asarray(positions, dtype=np.float64)
+    moving = np.zeros_like(points) if velocities is None else np.asarray(velocities, dtype=np.float64)
+    population.add(points, moving, np.full(len(points), MASS) if masses is None else np.asarray(masses))
+
+
+def copy(state: State) -> State:
+    return State(*(array.copy() for array in state))
+
+
+def test_the_radius_of_a_parcel_is_that_of_its_mass(make_population: MakePopulation) -> None:
+    population = make_population()
+    add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]], masses=[MASS, MASS / 8.0])
+    np.testing.assert_allclose(population.state.radii, [RADIUS, RADIUS / 2.0])
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=30, deadline=None)
+def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(
+    laws: Laws, make_population: MakePopulation, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    positions, velocities = rng.uniform(-1.0, 1.0, (30, 3)), rng.normal(0.0, 1.0, (30, 3))
+    masses = rng.uniform(0.1, 2.0, 30)
+    population = make_population(most_awake=12)
+    add(population, positions[:5], velocities[:5], masses[:5])
+    add(population, positions[5:], velocities[5:], masses[5:])
+    state = population.state
+    assert population.awake_count == len(state.masses) == 12
+    assert state.masses.sum() == pytest.approx(masses.sum(), rel=1e-14)
+    np.testing.assert_allclose(state.masses @ state.velocities, masses @ velocities, atol=1e-12)
+    np.testing.assert_allclose(state.masses @ state.positions, masses @ positions, atol=1e-12)
+    np.testing.assert_allclose(state.radii, RADIUS * np.cbrt(state.masses / MASS))
+
+
+def test_a_parcel_too_many_joins_the_nearest_one_that_is_awake(make_population: MakePopulation) -> None:
+    population = make_population(most_awake=3)
+    add(population, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    population.state.asleep[2] = 1
+    add(population, [[9.0, 0.0, 0.0], [1.9, 0.0, 0.0]])
+    np.testing.assert_allclose(population.state.masses, [MASS, 2 * MASS, MASS, MASS])
+    assert population.state.positions[1, 0] == pytest.approx(1.45)
+
+
+def fallen(
+    population: Population, tool: ToolPath, site: Site, ticks: int, rng: np.random.Generator
+) -> list[Landed]:
+    """Rain parcels and step."""
+    landed = []
+    for tick in range(ticks):
+        if tick % 2 == 0:
+            add(population, np.array([0.0, 0.0, 0.4]) + rng.uniform(-0.15, 0.15, (4, 3)))
+        population.step(tool, site, TICK, cutting=False)
+        landed.append(population.settle(TICK))
+    return landed
+
+
+def test_growing_beyond_the_first_room_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch, make_population: MakePopulation, no_tool: NoTool, site: MakeSite
+) -> None:
+    runs = []
+    for capacity in (3, 17, 1024):
+        monkeypatch.setattr(module, "_FIRST_CAPACITY", capacity)
+        population = make_population()
+        landed = fallen(population, no_tool(STEPS), site(), 40, np.random.default_rng(0))
+        runs.append(
+            [array.tobytes() for array in population.state]
+            + [part.points_w.tobytes() + part.masses_kg.tobytes() for part in landed]
+        )
+        assert len(population.state.masses) > 17
+        assert sum(len(part.masses_kg) for part in landed) > 10
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_room_for_a_crowd_that_the_first_arrays_cannot_hold(
+    make_population: MakePopulation, no_tool: NoTool, site: MakeSite
+) -> None:
+    """1200 parcels where there was room for 1024, 200 of them at one point with 19,900 pairs."""
+    population = make_population(most_awake=2000)
+    rng = np.random.default_rng(0)
+    add(population, np.array([0.0, 0.0, 3.0]) + rng.uniform(-1.0, 1.0, (1000, 3)))
+    population.step(no_tool(2), site(), 0.002, cutting=False)
+    add(population, np.tile([0.0, 0.0, 6.0], (200, 1)) + rng.uniform(-1e-3, 1e-3, (200, 3)))
+    population.step(no_tool(2), site(), 0.002, cutting=False)
+    state = population.state
+    assert len(state.masses) == 1200
+    assert np.isfinite(state.positions).all()
+    assert np.linalg.norm(state.velocities[1000:], axis=1).max() > 1.0  # each has seen the others
+
+
+def without(memory: Memory, gone: np.ndarray) -> Memory:
+    """Return the memory of pairs with the rows that stay after some have left."""
+    rows = np.cumsum(~gone) - 1
+    return {
+        (int(rows[i]), int(rows[j])): springs
+        for (i, j), springs in memory.items()
+        if not gone[i] and not gone[j]
+    }
+
+
+def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(
+    make_population: MakePopulation, no_tool: NoTool, site: MakeSite, laws: Laws
+) -> None:
+    """Sticky lumps beyond the border: what touches the ground there leaves at once, new parcels join above."""
+    sticky = laws._replace(parcel=laws.parcel._replace(cohesion=1e4))
+    population, memory = make_population(laws=sticky), {}
+    lump = 1.97 * RADIUS * np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    place, rng = np.array([4.0, 0.0, 0.12]), np.random.default_rng(1)
+    left = joined = 0
+    for tick in range(16):
+        if tick in (0, 4, 8):
+            start = lump + place + [0.0, 0.0, 0.05 * tick]
+            add(population, start, rng.normal(0.0, 0.05, (8, 3)))
+            joined += tick > 0
+        twin = copy(population.state)
+        population.step(no_tool(STEPS), site(), TICK, cutting=False)
+        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK / STEPS, STEPS)
+        np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
+        np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
+        touching = population.state.ground == TOUCHES_OUTSIDE
+        gone = touching & (population.state.load == 0)
+        left += len(population.settle(TICK).masses_kg)
+        memory = without(memory, gone)
+    assert left >= 8
+    assert joined == 2
+    assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) > 10
+
+
+def lying(population: Population, **arrays: Any) -> State:
+    """Add one parcel and set what a step would have found out about it."""
+    add(population, [[0.1, 0.2, RADIUS]])
+    for name, value in arrays.items():
+        getattr(population.state, name)[-1] = value
+    return population.state
+
+
+def ticks_until_landed(population: Population) -> int | None:
+    for tick in range(1, 20):
+        if len(population.settle(TICK).masses_kg):
+            return tick
+    return None
+
+
+@pytest.mark.parametrize("place", [TOUCHES_GROUND, TOUCHES_BOX_FLOOR])
+def test_a_parcel_becomes_ground_when_it_has_been_slow_there_for_a_while(
+    make_population: MakePopulation, place: int
+) -> None:
+    population = make_population()
+    lying(population, ground=place, velocities=[0.9 * SETTLING_SPEED_M_S, 0.0, 0.0])
+    assert ticks_until_landed(population) == math.ceil(SETTLING_TIME_S / TICK - 1e-9)
+    assert len(population.state.masses) == 0
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"ground": TOUCHES_GROUND, "velocities": [1.1 * SETTLING_SPEED_M_S, 0.0, 0.0]},
+        {"ground": TOUCHES_NOTHING},
+        {"ground": TOUCHES_GROUND, "load": 1},
+        {"ground": TOUCHES_GROUND, "load": 1, "asleep": 1},
+        {"ground": TOUCHES_OUTSIDE, "load": 1},
+    ],
+)
+def test_a_parcel_that_is_fast_or_in_the_air_or_in_the_bucket_stays_a_parcel(
+    make_population: MakePopulation, arrays: dict[str, Any]
+) -> None:
+    population = make_population()
+    lying(population, **arrays)
+    assert ticks_until_landed(population) is None
+
+
+def test_the_rest_on_the_ground_must_not_be_interrupted(make_population: MakePopulation) -> None:
+    population = make_population()
+    state = lying(population, ground=TOUCHES_GROUND)
+    for _ in range(3):
+        for _ in range(4):
+            assert len(population.settle(TICK).masses_kg) == 0
+        state.ground[0] = TOUCHES_NOTHING
+        population.settle(TICK)
+        state.ground[0] = TOUCHES_GROUND
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"ground": TOUCHES_OUTSIDE},
+        {"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL},
+    ],
+)
+def test_beyond_the_border_and_between_bucket_and_ground_a_parcel_goes_at_once(
+    make_population: MakePopulation, arrays: dict[str, Any]
+) -> None:
+    population = make_population()
+    lying(population, velocities=[5.0, 0.0, 0.0], **arrays)
+    assert ticks_until_landed(population) == 1
+
+
+def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population: MakePopulation) -> None:
+    population = make_population()
+    add(population, np.arange(15.0).reshape(5, 3), masses=MASS * np.arange(1.0, 6.0))
+    population.state.ground[:] = [
+        TOUCHES_OUTSIDE,
+        TOUCHES_NOTHING,
+        TOUCHES_BOX_FLOOR,
+        TOUCHES_GROUND,
+        TOUCHES_NOTHING,
+    ]
+    population.state.calm_s[:] = 1.0
+    landed = population.settle(TICK)
+    np.testing.assert_array_equal(landed.points_w, [[0.0, 1.0], [6.0, 7.0], [9.0, 10.0]])
+    np.testing.assert_allclose(landed.masses_kg, MASS * np.array([1.0, 3.0, 4.0]))
+    np.testing.assert_array_equal(landed.is_on_ground, [False, False, True])
+    np.testing.assert_array_equal(landed.is_in_box, [False, True, False])
+    np.testing.assert_allclose(population.state.masses, MASS * np.array([2.0, 5.0]))
+
+
+def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(
+    make_population: MakePopulation, tool_path: MakeTool, site: MakeSite
+) -> None:
+    """The back of a carried bucket is let down on a parcel that lies on the ground."""
+    population = make_population()
+    depth = float(BUCKET.profile_t[:, 1].max())
+    under = float(BUCKET.profile_t[np.argmax(BUCKET.profile_t[:, 1]), 0])
+    add(population, [[-under, 0.0, RADIUS]])
+    top, left = depth + 3.0 * RADIUS, 0
+    for _ in range(20):
+        tool = tool_path((0.0, 0.0, top), math.pi, (0.0, 0.0, -0.008), steps=STEPS)
+        top -= 0.008
+        population.step(tool, site(), TICK, cutting=False)
+        left += len(population.settle(TICK).masses_kg)
+    assert top < depth + RADIUS
+    assert left == 1
+    assert population.state.masses.sum() == 0.0
+
+
+def test_another_number_of_plates_clears_their_memory_and_nothing_else(
+    make_population: MakePopulation,
+) -> None:
+    population = make_population()
+    add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
+    population.state.plate_springs[:] = 1.0
+    plates = population.state.plate_springs.shape[1]
+    population.allow_plates(plates)
+    assert population.state.plate_springs.all()
+    population.allow_plates(plates + 2)
+    assert population.state.plate_springs.shape == (2, plates + 2, 6)
+    assert not population.state.plate_springs.any()
+    np.testing.assert_array_equal(population.state.positions[:, 2], [1.0, 2.0])
+
+
+def test_nothing_is_left_after_clearing_and_a_new_start_repeats_the_first(
+    make_population: MakePopulation, no_tool: NoTool, site: MakeSite
+) -> None:
+    population, runs = make_population(), []
+    for _ in range(2):
+        fallen(population, no_tool(STEPS), site(), 20, np.random.default_rng(0))
+        runs.append([array.tobytes() for array in population.state])
+        population.clear()
+        assert len(population.state.masses) == population.awake_count == 0
+    assert runs[0] == runs[1]

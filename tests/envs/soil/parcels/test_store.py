@@ -1,0 +1,46 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.soil.parcels.store import State, copy_rows, empty_state, keep, rows
+
+WORK_SPACE = {"forces", "torques"}
+"""Fields that every sub-step makes anew."""
+
+
+def filled(rng: np.random.Generator, count: int) -> State:
+    """Return a state with other numbers in every place."""
+    state = empty_state(count, 5)
+    for array in state:
+        array[:] = rng.integers(0, 200, array.shape)
+    return state
+
+
+@given(kept=st.lists(st.booleans(), min_size=1, max_size=30), seed=st.integers(0, 99))
+@settings(max_examples=60, deadline=None)
+def test_kept_rows_move_to_the_front_in_their_order_with_all_they_have(kept: list[bool], seed: int) -> None:
+    state = filled(np.random.default_rng(seed), len(kept))
+    before = State(*(array.copy() for array in state))
+    mask = np.array(kept)
+    count = keep(state, mask.astype(np.uint8))
+    assert count == mask.sum()
+    for name in set(State._fields) - WORK_SPACE:
+        np.testing.assert_array_equal(getattr(state, name)[:count], getattr(before, name)[mask], err_msg=name)
+
+
+def test_rows_are_views_and_copies_are_not(rng: np.random.Generator) -> None:
+    state, target = filled(rng, 3), empty_state(6, 5)
+    copy_rows(state, target)
+    view = rows(target, 3)
+    for a, b in zip(state, view, strict=True):
+        np.testing.assert_array_equal(a, b)
+    state.masses[0] = -1.0
+    assert view.masses[0] != -1.0
+    view.masses[0] = -2.0
+    assert target.masses[0] == -2.0
+
+
+def test_an_empty_state_is_zero_with_a_memory_for_each_plate() -> None:
+    state = empty_state(4, 7)
+    assert state.plate_springs.shape == (4, 7, 6)
+    assert all(len(array) == 4 and not array.any() for array in state)
