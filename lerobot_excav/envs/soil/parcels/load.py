@@ -118,7 +118,7 @@ class Rest:
         """
         weight_t = self._direction_of_weight(tool, dt_s)
         if state.asleep.any():
-            turned = math.acos(min(1.0, float(weight_t @ self._weight_t)))
+            turned = math.acos(max(-1.0, min(1.0, float(weight_t @ self._weight_t))))
             if cutting or hit_m_s > WAKING_SPEED_M_S or turned > WAKING_TILT_RAD:
                 state.asleep[:] = 0
                 self._calm_s = 0.0
