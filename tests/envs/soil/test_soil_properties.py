@@ -16,7 +16,7 @@ TICKS = 120
 GOAL_TICKS = 40
 CELL_M = 0.1
 EXTENT_M = 3.0
-NEAREST_PLATE = 0.2
+NEAREST_PLATE = 0.15
 """Smallest distance of a parcel's centre to a plate, as a share of its radius: steel never gets past the centre."""
 
 seeds = st.integers(0, 2**32 - 1)
