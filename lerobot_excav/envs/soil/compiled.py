@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -11,17 +12,29 @@ import numba
 _SOURCES = Path(__file__).parents[1]
 
 
+def _kernel_sources() -> list[str]:
+    """Return the sources that kernels are made of: files that hold any, and those whose constants they import."""
+    root = _SOURCES.parents[1]
+    sources = {
+        ".".join(path.relative_to(root).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for path in sorted(_SOURCES.rglob("*.py"))
+    }
+    holders = {name for name, source in sources.items() if "@kernel" in source}
+    imported = {
+        name for holder in holders for name in re.findall(r"^from ([\w.]+) import", sources[holder], re.M)
+    }
+    return [source for name, source in sources.items() if name in holders | imported]
+
+
 def _cache_directory() -> Path:
     """Return a directory for compiled code that belongs to exactly these kernels.
 
-    Numba looks at the file of a kernel alone: after a change in a kernel that it calls, in another file, it would go
-    on with the old code.
+    Numba looks at the file of a kernel alone: after a change in another file, of a kernel that it calls or of a
+    constant, it would go on with the old code.
     """
     digest = hashlib.sha256()
-    for path in sorted(_SOURCES.rglob("*.py")):
-        source = path.read_bytes()
-        if b"@kernel" in source:
-            digest.update(source)
+    for source in _kernel_sources():
+        digest.update(source.encode())
     name = f"kernels-{digest.hexdigest()[:16]}"
     beside = _SOURCES / "__pycache__"
     if os.access(beside if beside.exists() else _SOURCES, os.W_OK):

@@ -1,0 +1,99 @@
+import importlib
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from lerobot_excav.envs.soil import compiled
+
+CALLER = """
+from lerobot_excav.envs.soil.compiled import kernel
+from digest_probe.envs.callee import inner
+from digest_probe.envs.numbers import OFFSET
+
+@kernel
+def outer(x):
+    return 2.0 * inner(x) + OFFSET
+"""
+CALLEE = """
+from lerobot_excav.envs.soil.compiled import kernel
+
+@kernel
+def inner(x):
+    return x + {added}
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package in which a kernel of one file calls one of another file and uses a constant of a third."""
+    envs = tmp_path / "digest_probe" / "envs"
+    envs.mkdir(parents=True)
+    (envs / "caller.py").write_text(CALLER)
+    (envs / "callee.py").write_text(CALLEE.format(added=1.0))
+    (envs / "numbers.py").write_text("OFFSET = 0.0\n")
+    (envs / "notes.py").write_text("NOTHING = 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(compiled, "_SOURCES", envs)
+    monkeypatch.setattr(compiled.numba.config, "CACHE_DIR", "")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    return envs
+
+
+def result(monkeypatch: pytest.MonkeyPatch) -> float:
+    """Import the package as a new process would, and call its kernel."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "digest_probe"]:
+        del sys.modules[name]
+    importlib.invalidate_caches()
+    monkeypatch.setattr(compiled, "_CACHE", compiled._cache_directory())
+    caller = importlib.import_module("digest_probe.envs.caller")
+    return float(caller.outer(1.0))
+
+
+def rewrite(path: Path, text: str) -> None:
+    """Change a file so that Python, too, sees it: bytecode is kept by size and whole seconds."""
+    path.write_text(text)
+    later = path.stat().st_mtime + 10.0
+    os.utime(path, (later, later))
+
+
+def test_a_change_of_a_called_kernel_or_a_constant_in_another_file_is_seen(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert result(monkeypatch) == 4.0
+    rewrite(package / "callee.py", CALLEE.format(added=5.0))
+    assert result(monkeypatch) == 12.0
+    rewrite(package / "numbers.py", "OFFSET = 0.5\n")
+    assert result(monkeypatch) == 12.5
+
+
+def test_compiled_code_is_kept_beside_the_sources_under_their_digest(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result(monkeypatch)
+    first = compiled._cache_directory()
+    assert first.parent == package / "__pycache__"
+    assert list(first.rglob("*.nbi"))
+    rewrite(package / "notes.py", "NOTHING = 1\n")  # no kernel knows it
+    assert compiled._cache_directory() == first
+    rewrite(package / "callee.py", CALLEE.format(added=7.0))
+    assert compiled._cache_directory() != first
+
+
+def test_where_sources_cannot_be_written_the_user_cache_is_used(
+    package: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compiled.os, "access", lambda *_: False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert compiled._cache_directory().parent == tmp_path / "cache" / "lerobot_excav"
+
+
+def test_a_cache_directory_that_was_chosen_is_left_alone(
+    package: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    chosen = str(tmp_path / "chosen")
+    monkeypatch.setattr(compiled.numba.config, "CACHE_DIR", chosen)
+    result(monkeypatch)
+    assert compiled.numba.config.CACHE_DIR is chosen
+    assert list(Path(chosen).rglob("*.nbi"))
