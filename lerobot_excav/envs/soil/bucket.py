@@ -99,7 +99,7 @@ class Bucket:
         pose = Pose.of(tool, floor_depth_m)
         before, self.pose = self.pose, pose
         geometry = tool.geometry
-        if self.intake is None or self.intake.geometry is not geometry:
+        if self.intake is None or not self.intake.belongs_to(geometry):
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
             self.intake.volumes[0, 0] = waiting_m3

@@ -140,9 +140,8 @@ class LooseSoil:
         rows = np.flatnonzero((state.load == 0) & field.contains(state.positions[:, :2]))
         if len(rows) == 0:
             return field.heights
-        x0, y0, dx, dy = field.grid
-        i = np.rint((state.positions[rows, 0] - x0) / dx).astype(np.int64)
-        j = np.rint((state.positions[rows, 1] - y0) / dy).astype(np.int64)
+        cells = (state.positions[rows, :2] - field.grid[:2]) / field.grid[2:]
+        i, j = np.clip(np.rint(cells).astype(np.int64), 0, np.array(field.heights.shape) - 1).T
         heights = field.heights.copy()
         np.add.at(heights, (i, j), state.masses[rows] / self._density_kg_m3 / field.cell_area_m2)
         return heights

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -82,6 +83,19 @@ def test_a_bucket_takes_no_more_than_its_heap_holds() -> None:
     assert dig(bucket, field, load_m3=most) == 0.0
 
 
+def test_a_tool_described_anew_in_every_step_is_the_same_bucket() -> None:
+    bins = []
+    for anew in (False, True):
+        bucket, field = fresh()
+        for tick in range(10):
+            tool = tool_at(np.array([0.5 - 0.02 * tick, 0.0, 0.4]), math.radians(-120), np.zeros(3), 0.0)
+            alike = ToolGeometry(profile_t=BUCKET.profile_t, inner_width_m=BUCKET.inner_width_m)
+            bucket.move(dataclasses.replace(tool, geometry=alike) if anew else tool, field, 0.0, 0.0)
+        assert bucket.intake is not None
+        bins.append(bucket.intake.volumes)
+    np.testing.assert_array_equal(bins[0], bins[1])
+
+
 def test_what_waits_stays_in_a_bucket_that_goes_away_and_in_one_that_is_exchanged() -> None:
     bucket, field = fresh()
     entered = dig(bucket, field)
@@ -90,14 +104,7 @@ def test_what_waits_stays_in_a_bucket_that_goes_away_and_in_one_that_is_exchange
     assert bucket.waiting_m3 == pytest.approx(entered)
     other = ToolGeometry(profile_t=BUCKET.profile_t, inner_width_m=0.5)
     tool = tool_at(np.array([0.0, 0.0, 3.0]), math.pi, np.zeros(3), 0.0)
-    exchanged = type(tool)(
-        geometry=other,
-        position_w=tool.position_w,
-        rotation_w=tool.rotation_w,
-        linear_velocity_w=np.zeros(3),
-        angular_velocity_w=np.zeros(3),
-    )
-    bucket.move(exchanged, field, 0.0, 0.0)
+    bucket.move(dataclasses.replace(tool, geometry=other), field, 0.0, 0.0)
     assert bucket.waiting_m3 == pytest.approx(entered)
 
 

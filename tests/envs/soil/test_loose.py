@@ -166,6 +166,15 @@ def test_loose_parcels_weigh_on_the_column_that_they_are_over() -> None:
     assert np.count_nonzero(added) == 1
 
 
+@pytest.mark.parametrize("extent", [2.0, 3.0])
+def test_a_parcel_just_inside_the_border_weighs_on_the_last_column(extent: float) -> None:
+    """Rounding puts it half a cell beyond that column's centre, which is as near to the next one."""
+    soil = Soil(extent_m=(extent, extent), cell_size_m=extent / 40)
+    last = float(np.nextafter(extent / 2, 0.0))
+    soil.add_parcels([[last, -last, 1.0]], np.zeros((1, 3)))
+    assert np.argwhere(soil._loose.weighed_heights()).tolist() == [[39, 0]]
+
+
 def test_bad_parcels_are_refused() -> None:
     with pytest.raises(ConfigurationError, match=r"allowed: both \(n, 3\)"):
         Soil().add_parcels(np.zeros((2, 3)), np.zeros((1, 3)))

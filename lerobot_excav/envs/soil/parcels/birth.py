@@ -43,6 +43,26 @@ def gather(
     volumes[i, j] += volume
 
 
+@kernel
+def move_inside(points: Array, planes: Array, inset: float) -> None:
+    """Move tool points off the plates and the opening, into the bucket.
+
+    Args:
+        points: (n, 3) [m], changed in place.
+        planes: (m, 4) half-spaces of the inside.
+        inset: Wanted distance from each of them [m].
+    """
+    for i in range(len(points)):
+        for _ in range(_PASSES):
+            for k in range(len(planes)):
+                n0, n1, n2 = planes[k, 0], planes[k, 1], planes[k, 2]
+                height = points[i, 0] * n0 + points[i, 1] * n1 + points[i, 2] * n2 - planes[k, 3]
+                missing = max(0.0, height + inset)
+                points[i, 0] -= missing * n0
+                points[i, 1] -= missing * n1
+                points[i, 2] -= missing * n2
+
+
 class Intake:
     """Soil on its way into one bucket.
 
@@ -68,6 +88,13 @@ class Intake:
         x, z = (float(v) for v in across / length**2)
         self.frame = (float(self._edge[0]), float(self._edge[1]), x, z, float(geometry.inner_width_m))
 
+    def belongs_to(self, geometry: ToolGeometry) -> bool:
+        """Tell whether this is the intake of a bucket of that shape."""
+        own = self.geometry
+        return geometry is own or (
+            geometry.inner_width_m == own.inner_width_m and np.array_equal(geometry.profile_t, own.profile_t)
+        )
+
     @property
     def waiting_m3(self) -> float:
         """Volume that has entered the bucket and is not yet a parcel."""
@@ -88,13 +115,5 @@ class Intake:
             x, z = self._edge + share[0] * (self._lip - self._edge)
             points[k] = x, (share[1] - 0.5) * self.geometry.inner_width_m, z
         points += rng.uniform(-_JITTER, _JITTER, points.shape) * self._radius_m
-        return self._inside(points)
-
-    def _inside(self, points: Array) -> Array:
-        """Move points off the plates and the opening, into the bucket."""
-        planes = self.geometry.planes_t
-        for _ in range(_PASSES):
-            for n in planes:
-                missing = np.maximum(0.0, points @ n[:3] - n[3] + _INSET * self._radius_m)
-                points = points - missing[:, None] * n[:3]
+        move_inside(points, self.geometry.planes_t, _INSET * self._radius_m)
         return points
