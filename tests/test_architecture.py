@@ -65,7 +65,7 @@ def test_files_and_functions_stay_short(path):
             assert node.end_lineno - node.lineno + 1 <= 60, node.name
 
 
-@pytest.mark.parametrize("path", sorted((PACKAGE / "envs/soil").glob("*.py")), ids=name_of)
+@pytest.mark.parametrize("path", sorted((PACKAGE / "envs/soil").rglob("*.py")), ids=name_of)
 def test_soil_knows_nothing_of_mujoco(path):
     assert "import mujoco" not in path.read_text()
 
