@@ -33,7 +33,7 @@ FIDELITIES = {
         sweeps_per_tick=6,
         force_slices=4,
         parcel_radius_m=0.06,
-        substeps_per_tick=16,
+        substeps_per_tick=14,
         most_awake=500,
     ),
     "standard": Fidelity(
@@ -42,7 +42,7 @@ FIDELITIES = {
         sweeps_per_tick=8,
         force_slices=8,
         parcel_radius_m=0.045,
-        substeps_per_tick=20,
+        substeps_per_tick=16,
         most_awake=1000,
     ),
     "fine": Fidelity(
@@ -51,7 +51,7 @@ FIDELITIES = {
         sweeps_per_tick=12,
         force_slices=12,
         parcel_radius_m=0.036,
-        substeps_per_tick=40,
+        substeps_per_tick=30,
         most_awake=2000,
     ),
 }

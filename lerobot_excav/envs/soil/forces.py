@@ -74,6 +74,10 @@ def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, w
     return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
 
 
+CLEAR_M = 0.1
+"""A bucket whose inside stays this far above all soil touches none; its plates are thinner (PLATE_THICKNESS_M)."""
+
+
 class DiggingResistance:
     """Reaction of the soil to a bucket.
 
@@ -118,6 +122,10 @@ class DiggingResistance:
             payload_mass_kg: Soil in the bucket, as the reaction shall say.
             payload_com_t: (3,) its centre of mass, likewise.
         """
+        corners_w = tool.position_w + tool.geometry.corners_t @ tool.rotation_w.T
+        if corners_w[:, 2].min() + floor_depth_m > weighed_heights_m.max() + CLEAR_M:
+            self.forget()
+            return Reaction.free(payload_mass_kg, payload_com_t)
         patches = Patches.joined(
             *self._edge(heights_m, weighed_heights_m, grid, tool, floor_depth_m),
             self._plates(tool.geometry).patches(heights_m, grid, tool, floor_depth_m, dt_s),

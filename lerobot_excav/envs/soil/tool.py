@@ -81,7 +81,7 @@ class ToolGeometry:
         x, z = self.profile_t[:, 0], self.profile_t[:, 1]
         return np.concatenate([np.stack([x, np.full_like(x, y), z], axis=1) for y in (-half, half)])
 
-    @property
+    @cached_property
     def struck_volume_m3(self) -> float:
         """Volume below the opening [m3]."""
         x, z = self.profile_t[:, 0], self.profile_t[:, 1]

@@ -114,9 +114,4 @@ EXPERIMENT = Experiment(
     gate="in every cell from 0.8 times the least to 1.25 times the greatest theory; growing with depth, exponent "
     "1.6 to 2.1; least near a rake of 35° to 45°",
     run=run,
-    reasons={
-        "force at 90°": "The rake of the force model ends at 75°, since beyond it a wedge of dead soil forms on the "
-        "blade and a planar wedge over-predicts (Miedema, ch. 11). So the blade at 90° gets the force of 75°, while "
-        "the theories of the bracket go on."
-    },
 )

@@ -32,8 +32,14 @@ class Laws(NamedTuple):
 
 
 @kernel
-def _carry(state: State, tool: ToolPath, step: int) -> None:
-    """Move the sleeping parcels with the bucket."""
+def carry(state: State, tool: ToolPath, step: int) -> None:
+    """Move the sleeping parcels with the bucket.
+
+    Args:
+        state: All parcels, changed in place.
+        tool: The bucket.
+        step: Which of its poses.
+    """
     position, rotation = tool.positions[step], tool.rotations[step]
     w = (tool.angular[0], tool.angular[1], tool.angular[2])
     for i in range(len(state.masses)):
@@ -173,7 +179,7 @@ def advance(
     state.ground[:] = TOUCHES_NOTHING
     for step in range(steps):
         if tool.present:
-            _carry(state, tool, step)
+            carry(state, tool, step)
         if is_outdated(state.positions, state.radii, pairs.anchors):
             new = find_pairs(state.positions, state.radii, state.asleep, pairs, same_rows, spare)
             pairs, spare = new, pairs
@@ -187,7 +193,7 @@ def advance(
             press_box(state, walls, site.box, laws.steel, dt)
         _integrate(state, dt)
     if tool.present:
-        _carry(state, tool, steps)
+        carry(state, tool, steps)
     else:
         state.shell[:] = OFF_BUCKET
     return pairs, spare, hit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
+from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
 from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
@@ -159,11 +159,14 @@ class Population:
         """
         if len(self.state.masses) == 0:
             return
-        steps = len(tool.positions) - 1
-        self._pairs, self._spare, hit = advance(
-            self.state, self._pairs, self._spare, self._rows, tool, site, self._laws, dt_s / steps, steps
-        )
-        self._rows = np.arange(len(self.state.masses))
+        steps, hit = len(tool.positions) - 1, 0.0
+        if self.awake_count > 0:
+            self._pairs, self._spare, hit = advance(
+                self.state, self._pairs, self._spare, self._rows, tool, site, self._laws, dt_s / steps, steps
+            )
+            self._rows = np.arange(len(self.state.masses))
+        elif tool.present:
+            carry(self.state, tool, steps)
         if tool.present:
             self._rest.update(self.state, tool, dt_s, hit, cutting=cutting)
 
