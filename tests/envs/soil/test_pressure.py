@@ -115,7 +115,7 @@ def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving() -> Non
     depth, width, count = 0.4, 0.7, 400
     levels = (np.arange(count) + 0.5) / count * depth
     whole = sum(limit(float(z), 0.0, LEVEL, area=depth / count * width, breadth=0.0) for z in levels)
-    rake = math.radians(75.0)  # the end of the table
+    rake = math.radians(90.0)  # the end of the table
     failure = failure_angle(rake, SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
     factor = earthmoving_factors(rake, failure, SAND.friction_angle_rad, SAND.steel_friction_angle_rad).weight
     expected = WEIGHT * depth**2 * factor * width * math.cos(SAND.steel_friction_angle_rad)
