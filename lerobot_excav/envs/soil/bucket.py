@@ -43,6 +43,16 @@ def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
     return geometry.struck_volume_m3 + slope_tan * (a**2 * b / 4 - a**3 / 12)
 
 
+def _require_no_jump(geometry: ToolGeometry, before: Pose | None, now: Pose) -> None:
+    """Refuse a motion that no machine makes within a step."""
+    moved = 0.0 if before is None else largest_motion(geometry.corners_t, before, now)
+    require(
+        moved <= LARGEST_MOTION_M,
+        f"tool moved {moved:.3g} m in one step; allowed: {LARGEST_MOTION_M} m. "
+        "After placing the machine by hand, reset the soil or step once with tool=None.",
+    )
+
+
 class Bucket:
     """One tool at work in a height field.
 
@@ -97,8 +107,9 @@ class Bucket:
             ConfigurationError: The tool jumped by more than `LARGEST_MOTION_M`.
         """
         pose = Pose.of(tool, floor_depth_m)
-        before, self.pose = self.pose, pose
         geometry = tool.geometry
+        _require_no_jump(geometry, self.pose, pose)
+        before, self.pose = self.pose, pose
         if self.intake is None or not self.intake.belongs_to(geometry):
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
@@ -144,11 +155,6 @@ class Bucket:
         room: float,
     ) -> tuple[float, float]:
         moved = largest_motion(geometry.corners_t, before, now)
-        require(
-            moved <= LARGEST_MOTION_M,
-            f"tool moved {moved:.3g} m in one step; allowed: {LARGEST_MOTION_M} m. "
-            "After placing the machine by hand, reset the soil or step once with tool=None.",
-        )
         steps = max(1, math.ceil(moved / (self._fidelity.substep_cells * min(field.grid[2:]))))
         entered, lost = 0.0, 0.0
         for start, end in poses_between(before, now, steps):

@@ -43,7 +43,10 @@ class Container:
             bool((self.half_extent_m > 0).all()),
             f"container half_extent_m={self.half_extent_m}; allowed: above 0.",
         )
-        require(self.wall_height_m > 0, f"container wall_height_m={self.wall_height_m!r}; allowed: above 0.")
+        require(
+            0 < self.wall_height_m < math.inf,
+            f"container wall_height_m={self.wall_height_m!r}; allowed: above 0 and finite.",
+        )
         require(math.isfinite(self.yaw_rad), f"container yaw_rad={self.yaw_rad!r}; allowed: a finite angle.")
 
     @property

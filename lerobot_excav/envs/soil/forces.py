@@ -140,7 +140,7 @@ class DiggingResistance:
         )
 
     def _plates(self, geometry: ToolGeometry) -> PlatePressure:
-        if self._pressure is None or self._geometry is not geometry:
+        if self._pressure is None or self._geometry is None or not self._geometry.has_shape_of(geometry):
             self._geometry = geometry
             faces = OuterFaces.of(geometry, max(2, self._slices // 2))
             self._pressure = PlatePressure(faces, self._soil, self._table)

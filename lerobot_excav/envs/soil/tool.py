@@ -48,7 +48,10 @@ class ToolGeometry:
             f"profile_t has shape {points.shape}; allowed: (n, 2) with n >= 3.",
         )
         object.__setattr__(self, "profile_t", _fixed(points, points.shape, "profile_t"))
-        require(self.inner_width_m > 0.0, f"inner_width_m={self.inner_width_m!r}; allowed: above 0.")
+        require(
+            0.0 < self.inner_width_m < np.inf,
+            f"inner_width_m={self.inner_width_m!r}; allowed: above 0 and finite.",
+        )
         require(bool((points[:, 1] >= -1e-9).all()), "profile_t has z_t < 0; the shell lies on the +z side.")
         side = np.roll(points, -1, axis=0) - points
         following = np.roll(side, -1, axis=0)
@@ -57,6 +60,21 @@ class ToolGeometry:
             bool((turn > -_CONVEX_TOLERANCE_M2).all()),
             f"profile_t={points.tolist()} is not convex and counter-clockwise; "
             "list it from the cutting edge over bottom and back to the lip, bulging outwards only.",
+        )
+        require(
+            bool((np.abs(side).max(axis=1) > 0.0).all()),
+            f"profile_t={points.tolist()} lists the same point twice in a row (the last one meets the first); "
+            "leave one out.",
+        )
+        require(
+            self.struck_volume_m3 > 0.0,
+            f"profile_t={points.tolist()} holds no volume; its points must not lie on one line.",
+        )
+
+    def has_shape_of(self, other: "ToolGeometry") -> bool:
+        """Tell whether another geometry describes the same bucket."""
+        return self is other or (
+            self.inner_width_m == other.inner_width_m and np.array_equal(self.profile_t, other.profile_t)
         )
 
     @cached_property
@@ -124,6 +142,11 @@ class Tool:
         object.__setattr__(self, "rotation_w", _fixed(self.rotation_w, (3, 3), "rotation_w"))
         error = float(np.abs(self.rotation_w.T @ self.rotation_w - np.eye(3)).max())
         require(error < 1e-6, f"rotation_w is off orthonormal by {error:.2g}; allowed: 1e-6.")
+        first, second, third = self.rotation_w.T
+        require(
+            float(np.dot(np.cross(first, second), third)) > 0.0,
+            f"rotation_w={self.rotation_w.tolist()} is a reflection; its columns must be right-handed axes.",
+        )
 
     @property
     def pitch_rad(self) -> float:

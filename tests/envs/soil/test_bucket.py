@@ -10,6 +10,7 @@ from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.tool import ToolGeometry
+from lerobot_excav.errors import ConfigurationError
 
 SAND = PRESETS["sand"]
 CELL = 0.05
@@ -94,6 +95,17 @@ def test_a_tool_described_anew_in_every_step_is_the_same_bucket() -> None:
         assert bucket.intake is not None
         bins.append(bucket.intake.volumes)
     np.testing.assert_array_equal(bins[0], bins[1])
+
+
+def test_a_jump_is_refused_however_often_it_is_tried() -> None:
+    bucket, field = fresh()
+    dig(bucket, field)
+    before = bucket.pose
+    jump = tool_at(np.array([2.5, 0.0, 0.4]), math.radians(-120), np.zeros(3), 0.0)
+    for _ in range(2):
+        with pytest.raises(ConfigurationError, match="tool moved"):
+            bucket.move(jump, field, 0.0, 0.0)
+        assert bucket.pose is before
 
 
 def test_what_waits_stays_in_a_bucket_that_goes_away_and_in_one_that_is_exchanged() -> None:

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,7 @@ def test_overlap_with_the_dig_area(placed: Container, overlaps: bool) -> None:  
     assert placed.overlaps((6.0, 6.0)) is overlaps
 
 
-def test_a_box_without_walls_is_refused() -> None:
+@pytest.mark.parametrize("height", [0.0, math.nan, math.inf])
+def test_a_box_without_walls_or_with_endless_ones_is_refused(height: float) -> None:
     with pytest.raises(ConfigurationError, match="wall_height_m"):
-        Container(center_w=np.zeros(3), half_extent_m=np.ones(2), wall_height_m=0.0, yaw_rad=0.0)
+        Container(center_w=np.zeros(3), half_extent_m=np.ones(2), wall_height_m=height, yaw_rad=0.0)

@@ -282,6 +282,22 @@ def test_a_bucket_that_was_away_has_not_sunk_in() -> None:
     assert second > first == held()
 
 
+def test_a_bucket_described_anew_remembers_how_far_it_has_sunk_in() -> None:
+    field, velocity = flat(), np.array([0.0, 0.0, -1.0])
+    tool = tool_at(np.array([0.0, 0.0, 1.0]), -math.pi, velocity, 0.0)
+    limits = []
+    for anew in (False, True):
+        resistance = DiggingResistance(SAND, 8)
+        for _ in range(3):
+            geometry = dataclasses.replace(BUCKET) if anew else BUCKET
+            now = dataclasses.replace(tool, geometry=geometry)
+            reaction = resistance.react(
+                field.heights, field.heights, field.grid, now, 0.0, 0.02, 0.0, EMPTY_COM_T
+            )
+        limits.append(reaction.patches.limits_n)
+    np.testing.assert_array_equal(*limits)
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_soil_resists(preset: str) -> None:
     found = force(PRESETS[preset], flat(), dragged(40, 0.3), *PatchKind)

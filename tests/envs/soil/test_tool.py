@@ -45,11 +45,28 @@ def test_corners_lie_on_the_planes_and_the_centroid_inside() -> None:
         (np.array([(1.0, 0.0), (0.5, 0.1), (0.4, 0.5), (0.0, 0.0)]), "not convex"),
         (np.array([(1.0, 0.0), (0.5, 0.5), (0.0, -0.1)]), "z_t < 0"),
         (np.array([(1.0, 0.0), (0.5, np.nan), (0.0, 0.0)]), "not finite"),
+        (np.array([(1.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 0.0)]), "lists the same point twice"),
+        (np.array([(1.0, 0.0), (0.5, 0.5), (0.0, 0.0), (1.0, 0.0)]), "lists the same point twice"),
+        (np.array([(1.0, 0.0), (0.5, 0.0), (0.0, 0.0)]), "holds no volume"),
     ],
 )
 def test_a_bad_profile_is_refused(profile: np.ndarray, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         ToolGeometry(profile_t=profile, inner_width_m=1.0)
+
+
+@pytest.mark.parametrize("width", [0.0, np.nan, np.inf])
+def test_a_bad_width_is_refused(width: float) -> None:
+    with pytest.raises(ConfigurationError, match="inner_width_m"):
+        ToolGeometry(profile_t=TRIANGLE, inner_width_m=width)
+
+
+def test_a_geometry_knows_its_shape_and_no_other() -> None:
+    geometry = ToolGeometry(profile_t=TRIANGLE, inner_width_m=1.0)
+    assert geometry.has_shape_of(ToolGeometry(profile_t=TRIANGLE, inner_width_m=1.0))
+    assert not geometry.has_shape_of(ToolGeometry(profile_t=TRIANGLE, inner_width_m=2.0))
+    assert not geometry.has_shape_of(ToolGeometry(profile_t=2 * TRIANGLE, inner_width_m=1.0))
+    assert not geometry.has_shape_of(BUCKET)
 
 
 def test_a_bad_pose_is_refused() -> None:
@@ -59,6 +76,8 @@ def test_a_bad_pose_is_refused() -> None:
         tool(linear_velocity_w=np.array([np.inf, 0, 0]))
     with pytest.raises(ConfigurationError, match="off orthonormal"):
         tool(rotation_w=2 * np.eye(3))
+    with pytest.raises(ConfigurationError, match="is a reflection"):
+        tool(rotation_w=np.diag([1.0, 1.0, -1.0]))
 
 
 @pytest.mark.parametrize("pitch", [-3.0, -1.5, 0.0, 0.4, 3.0])

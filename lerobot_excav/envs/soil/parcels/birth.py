@@ -90,10 +90,7 @@ class Intake:
 
     def belongs_to(self, geometry: ToolGeometry) -> bool:
         """Tell whether this is the intake of a bucket of that shape."""
-        own = self.geometry
-        return geometry is own or (
-            geometry.inner_width_m == own.inner_width_m and np.array_equal(geometry.profile_t, own.profile_t)
-        )
+        return self.geometry.has_shape_of(geometry)
 
     @property
     def waiting_m3(self) -> float:

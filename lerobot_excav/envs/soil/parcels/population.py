@@ -1,6 +1,7 @@
 """All parcels of a soil: they join, move, carry, land and leave."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,12 @@ class Population:
         self._all = empty_state(_FIRST_CAPACITY, plates)
         self._pairs, self._spare = room_for(_FIRST_CAPACITY), room_for(_FIRST_CAPACITY)
         self.clear()
+
+    def __setstate__(self, attributes: dict[str, Any]) -> None:
+        """Restore a copy: `state` must look into its arrays again, since a copy of a view owns its data."""
+        self.__dict__.update(attributes)
+        copy_rows(self.state, self._all)
+        self.state = rows(self._all, len(self.state.masses))
 
     def clear(self) -> None:
         """Remove all parcels."""

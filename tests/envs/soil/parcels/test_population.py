@@ -1,5 +1,7 @@
 import math
+import pickle
 from collections.abc import Callable
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -298,3 +300,22 @@ def test_nothing_is_left_after_clearing_and_a_new_start_repeats_the_first(
         population.clear()
         assert len(population.state.masses) == population.awake_count == 0
     assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("copied", [deepcopy, lambda population: pickle.loads(pickle.dumps(population))])
+def test_a_copy_goes_on_like_its_original(
+    copied: Callable[[Population], Population],
+    make_population: MakePopulation,
+    no_tool: NoTool,
+    site: MakeSite,
+) -> None:
+    original = make_population()
+    fallen(original, no_tool(STEPS), site(), 12, np.random.default_rng(0))
+    other = copied(original)
+    for population in (original, other):
+        population.step(no_tool(STEPS), site(), TICK, cutting=False)
+        landed = fallen(population, no_tool(STEPS), site(), 12, np.random.default_rng(1))
+        assert any(len(one.masses_kg) for one in landed)
+    assert len(original.state.masses) > 0
+    for own, same in zip(original.state, other.state, strict=True):
+        np.testing.assert_array_equal(own, same)
