@@ -86,17 +86,17 @@ class Population:
         self._pairs, self._spare = room_for(_FIRST_CAPACITY), room_for(_FIRST_CAPACITY)
         self.clear()
 
-    def __setstate__(self, attributes: dict[str, Any]) -> None:
-        """Restore a copy: `state` must look into its arrays again, since a copy of a view owns its data."""
-        self.__dict__.update(attributes)
-        copy_rows(self.state, self._all)
-        self.state = rows(self._all, len(self.state.masses))
-
     def clear(self) -> None:
         """Remove all parcels."""
         self.state = rows(self._all, 0)
         self._rows: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._rest.clear()
+
+    def __setstate__(self, attributes: dict[str, Any]) -> None:
+        """Restore a copy: `state` must look into its arrays again, since a copy of a view owns its data."""
+        self.__dict__.update(attributes)
+        copy_rows(self.state, self._all)
+        self.state = rows(self._all, len(self.state.masses))
 
     def allow_plates(self, plates: int) -> None:
         """Set how many plates parcels may touch; a new number clears the memory of those contacts."""
