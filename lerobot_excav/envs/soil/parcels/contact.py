@@ -3,8 +3,8 @@
 Sliding and rolling follow Luding 2008 (Granular Matter 10:235, sections 2.3 and 2.4): a spring that remembers how far
 the contact has slid (rolled) while it sticks, cut off at the friction coefficient times the normal force. Sand does not
 bounce: the normal force fades as the partners separate, so that even a sudden overlap (a parcel born too near to
-another one, ground that rose under it) pushes them apart at no more than `SEPARATION_M_S`, or the speed that its force makes in one sub-step, before it can
-fade.
+another one, ground that rose under it) pushes them apart at no more than `SEPARATION_M_S`, or the speed that its force
+makes in one sub-step, before it can fade.
 """
 
 import math
