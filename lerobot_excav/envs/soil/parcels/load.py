@@ -117,15 +117,17 @@ class Rest:
             cutting: Whether soil entered the bucket.
         """
         weight_t = self._direction_of_weight(tool, dt_s)
+        woken = False
         if state.asleep.any():
             turned = math.acos(max(-1.0, min(1.0, float(weight_t @ self._weight_t))))
-            if cutting or hit_m_s > WAKING_SPEED_M_S or turned > WAKING_TILT_RAD:
-                state.asleep[:] = 0
-                self._calm_s = 0.0
+            woken = cutting or hit_m_s > WAKING_SPEED_M_S or turned > WAKING_TILT_RAD
+        if woken:
+            state.asleep[:] = 0
+            self._calm_s = 0.0
         mass, square_speed, touching = find_load(state, tool)
         calm = mass > 0.0 and not touching and not cutting and square_speed < RESTING_SPEED_M_S**2
         self._calm_s = self._calm_s + dt_s if calm else 0.0
-        if self._calm_s >= RESTING_TIME_S:
+        if self._calm_s >= RESTING_TIME_S and not woken:  # one step at least to move in, however long that is
             if not state.asleep.any():
                 self._weight_t = weight_t
             put_to_sleep(state, tool)

@@ -207,6 +207,15 @@ def test_a_tilt_wakes_the_load_however_slowly_it_comes(
     assert not state.asleep.any()
 
 
+@pytest.mark.parametrize("duration", [0.02, 0.05, RESTING_TIME_S])
+def test_a_woken_load_gets_a_step_to_move_in(
+    make_state: MakeState, tool_path: MakeTool, duration: float
+) -> None:
+    state, rest = asleep_in(make_state, tool_path(pitch=CARRY))
+    rest.update(state, tool_path(pitch=CARRY + 1.05 * WAKING_TILT_RAD), duration, 0.0, cutting=False)
+    assert not state.asleep.any()
+
+
 def test_steady_motion_does_not_wake_the_load_and_a_lasting_acceleration_does(
     make_state: MakeState, tool_path: MakeTool
 ) -> None:
