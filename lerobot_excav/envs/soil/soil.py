@@ -1,5 +1,7 @@
 """The soil: one class that owns every kilogram and steps it."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,8 +21,8 @@ Array = NDArray[np.float64]
 def _whole_cells(length_m: float, cell_size_m: float, field: str) -> int:
     """Return how many cells make a length; it must be a whole number."""
     require(
-        length_m > 0 and cell_size_m > 0,
-        f"{field}={length_m!r}, cell_size_m={cell_size_m!r}; allowed: above 0.",
+        0 < length_m < math.inf and 0 < cell_size_m < math.inf,
+        f"{field}={length_m!r}, cell_size_m={cell_size_m!r}; allowed: above 0 and finite.",
     )
     count = round(length_m / cell_size_m)
     require(
@@ -62,10 +64,14 @@ class Soil:
         floor_depth_m: float = 0.0,
     ) -> None:
         if not isinstance(preset, SoilParameters):
-            require_choice("preset", preset, PRESETS)
+            require_choice("preset", preset, tuple(PRESETS))
             preset = PRESETS[preset]
-        require_choice("fidelity", fidelity, FIDELITIES)
-        require(floor_depth_m >= 0.0, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above.")
+        require_choice("fidelity", fidelity, tuple(FIDELITIES))
+        require(len(extent_m) == 2, f"extent_m={extent_m!r}; allowed: two lengths, along x and y.")
+        require(
+            0.0 <= floor_depth_m < math.inf, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above, finite."
+        )
+        require(seed >= 0, f"seed={seed!r}; allowed: 0 and above.")
         require(
             container is None or not container.overlaps(extent_m),
             "container overlaps the dig area; move its center_w outside of extent_m.",

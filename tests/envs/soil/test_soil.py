@@ -241,6 +241,11 @@ def test_views_cannot_be_written_to() -> None:
     ("arguments", "message"),
     [
         ({"preset": "mud"}, "preset='mud' is not known; allowed: 'sand'"),
+        ({"preset": ["sand"]}, r"preset=\['sand'\] is not known; allowed: 'sand'"),
+        ({"extent_m": (math.inf, 6.0)}, r"extent_m\[0\]=inf"),
+        ({"extent_m": (6.0,)}, r"extent_m=\(6.0,\); allowed: two lengths"),
+        ({"floor_depth_m": math.inf}, "floor_depth_m=inf"),
+        ({"seed": -1}, "seed=-1; allowed: 0 and above"),
         ({"fidelity": "best"}, "fidelity='best' is not known; allowed: 'fast'"),
         ({"extent_m": (6.02, 6.0)}, r"extent_m\[0\]=6\.02 is not a whole number"),
         ({"cell_size_m": 0.0}, "cell_size_m=0.0; allowed: above 0"),
