@@ -41,7 +41,7 @@ FIDELITIES = {
         substep_cells=0.5,
         sweeps_per_tick=8,
         force_slices=8,
-        parcel_radius_m=0.045,
+        parcel_radius_m=0.048,
         substeps_per_tick=16,
         most_awake=1000,
     ),

@@ -131,8 +131,9 @@ class LooseSoil:
             tool = self._with_tool(geometry, now if before is None else before, now, dt_s)
         self._tool = tool
         self.population.allow_plates(len(tool.profile) + 1 + WALLS)
-        self.population.step(tool, self._site(), dt_s, cutting=cutting)
-        return self._merge(self.population.settle(dt_s))
+        site = self._site()
+        self.population.step(tool, site, dt_s, cutting=cutting)
+        return self._merge(self.population.settle(site, dt_s))
 
     def weighed_heights(self) -> Array:
         """Return (nx, ny) heights of the dig area [m] with the parcels outside of the bucket put on their columns."""

@@ -44,8 +44,8 @@ class SoilParameters:
     parcel_solid_fraction: float = 0.56
     parcel_sliding_scale: float = 0.62
     parcel_rolling_scale: float = 0.37
-    ground_sliding_scale: float = 1.6
-    ground_rolling_scale: float = 1.2
+    ground_sliding_scale: float = 1.7
+    ground_rolling_scale: float = 1.3
     penetration_scale: float = 1.0
 
     def __post_init__(self) -> None:

@@ -57,7 +57,7 @@ def test_what_enters_waits_and_what_waits_is_born() -> None:
     assert bucket.waiting_m3 == pytest.approx(entered)
     assert field.volume_m3 + entered == pytest.approx(volume)
     points, masses = bucket.births(all_of_it=False, rng=np.random.default_rng(0))
-    whole = SAND.parcel_mass_kg(0.045)
+    whole = SAND.parcel_mass_kg(FIDELITIES["standard"].parcel_radius_m)
     assert len(points) == len(masses) == int(entered * SAND.density_kg_m3 / whole)
     np.testing.assert_allclose(masses, whole)
     assert masses.sum() + bucket.waiting_m3 * SAND.density_kg_m3 == pytest.approx(

@@ -180,3 +180,23 @@ def test_bad_parcels_are_refused() -> None:
         Soil().add_parcels(np.zeros((2, 3)), np.zeros((1, 3)))
     with pytest.raises(ConfigurationError, match="not finite"):
         Soil().add_parcels([[0.0, 0.0, np.nan]], np.zeros((1, 3)))
+
+
+def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while() -> None:
+    wall_x = BOX.center_w[0] + BOX.half_extent_m[0]
+    for offset in (-0.001, 0.001):
+        soil = Soil(container=BOX)
+        soil.add_parcels([[wall_x + offset, BOX.center_w[1], 1.3]], np.zeros((1, 3)))
+        fall(soil, 4.0)
+        assert soil.airborne_mass_kg == 0.0
+        ledger = soil.ledger_kg()
+        assert ledger["box"] + ledger["out_of_bounds"] == pytest.approx(soil.parcel_mass_kg)
+
+
+@pytest.mark.parametrize("mass_kg", [1e-6, 1e-4, 1e-2])
+def test_cohesion_draws_no_crumb_through_the_ground(mass_kg: float) -> None:
+    soil = Soil("wet_sand")
+    soil.reset(np.full((120, 120), 0.3))
+    soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]))
+    fall(soil, 3.0)
+    assert soil.airborne_mass_kg == 0.0

@@ -27,6 +27,9 @@ SEPARATION_M_S = 0.3
 LARGEST_OVERLAP = 0.5
 """Share of the radius above which the normal force grows no more (guess)."""
 
+MOST_COHESION = 0.5
+"""Largest pull of cohesion over the largest push of the normal spring (guess)."""
+
 TANGENTIAL_STIFFNESS = 0.4
 """Stiffness of the sliding and the rolling spring over that of the normal spring (usual choice, e.g. 2/7 to 1)."""
 
@@ -188,7 +191,9 @@ def contact(
     roll = spring_force(
         springs, row, 3, normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt
     )
-    net = pressing - law.cohesion * math.pi * radius * radius
+    # A pull that no overlap can balance would draw light parcels through the ground.
+    most = MOST_COHESION * normal_stiffness * LARGEST_OVERLAP * radius
+    net = pressing - min(law.cohesion * math.pi * radius * radius, most)
     return (net * normal[0] + slide[0], net * normal[1] + slide[1], net * normal[2] + slide[2]), roll
 
 

@@ -95,7 +95,7 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
         dt: Duration [s].
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
-    springs, on_ground = state.ground_springs, state.on_ground
+    springs, on_ground, near_plate = state.ground_springs, state.on_ground, state.near_plate
     for i in range(len(state.masses)):
         r = state.radii[i]
         if state.asleep[i] or state.shell[i] == SHELTERED or positions[i, 2] > highest + r:
@@ -112,7 +112,7 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
             continue
         on_ground[i] = 1
         state.ground[i] = place
-        if gap < LEAST_GAP * r:
+        if gap < LEAST_GAP * r and not near_plate[i]:  # never into a plate
             lift = min(LEAST_GAP * r - gap, LIFT * r)
             for a in range(3):
                 positions[i, a] += lift * normal[a]

@@ -27,6 +27,12 @@ LEAVING_M_S = 1.0
 RESTING_SPEED_M_S = 0.08
 """Root mean square speed in the bucket below which a load is at rest (tuned: a load that shakes with the machine)."""
 
+FLOWING_SPEED_M_S = 0.3
+"""Speed in the bucket above which a parcel flows (guess)."""
+
+MOST_FLOWING = 0.01
+"""Share of a load's mass that may flow while it is at rest: a thin layer that pours over the edge is more (tuned)."""
+
 RESTING_TIME_S = 0.1
 """How long it stays so before it falls asleep."""
 
@@ -39,7 +45,7 @@ _ACCELERATION_TIME_S = 0.1
 
 
 @kernel
-def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
+def find_load(state: State, tool: ToolPath) -> tuple[float, float, float, int]:
     """Mark the parcels that lie in the bucket or in the heap above its opening and its rim.
 
     Args:
@@ -47,8 +53,8 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
         tool: The bucket; its last pose counts.
 
     Returns:
-        Mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; 1 if that touches
-        the ground, else 0.
+        Mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; share of it that
+        flows; 1 if it touches the ground, else 0.
     """
     step = len(tool.positions) - 1
     position, rotation = tool.positions[step], tool.rotations[step]
@@ -56,7 +62,7 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
     up = tool.planes[0, 0] * rotation[2, 0] + tool.planes[0, 2] * rotation[2, 2]
     first, last = tool.profile[0], tool.profile[len(tool.profile) - 1]
     length = math.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2)
-    mass, energy, touching = 0.0, 0.0, 0
+    mass, energy, flowing, touching = 0.0, 0.0, 0.0, 0
     for i in range(len(state.masses)):
         if state.asleep[i]:
             continue
@@ -77,9 +83,13 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, int]:
         if state.load[i]:
             mass += state.masses[i]
             energy += state.masses[i] * speed
+            if speed > FLOWING_SPEED_M_S**2:
+                flowing += state.masses[i]
             if state.ground[i] != TOUCHES_NOTHING:
                 touching = 1
-    return mass, energy / mass if mass > 0.0 else 0.0, touching
+    if mass == 0.0:
+        return 0.0, 0.0, 0.0, touching
+    return mass, energy / mass, flowing / mass, touching
 
 
 def places_in(position: Array, rotation: Array, positions: Array) -> Array:
@@ -124,8 +134,9 @@ class Rest:
         if woken:
             state.asleep[:] = 0
             self._calm_s = 0.0
-        mass, square_speed, touching = find_load(state, tool)
-        calm = mass > 0.0 and not touching and not cutting and square_speed < RESTING_SPEED_M_S**2
+        mass, square_speed, flowing, touching = find_load(state, tool)
+        slow = square_speed < RESTING_SPEED_M_S**2 and flowing <= MOST_FLOWING
+        calm = mass > 0.0 and slow and not touching and not cutting
         self._calm_s = self._calm_s + dt_s if calm else 0.0
         if self._calm_s >= RESTING_TIME_S and not woken:  # one step at least to move in, however long that is
             if not state.asleep.any():

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
-from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
 from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
@@ -31,6 +31,9 @@ SETTLING_SPEED_M_S = 0.4
 
 SETTLING_TIME_S = 0.1
 """How long it has to be so slow."""
+
+DROPPING_TIME_S = 1.0
+"""How long a parcel may rest on steel or on others before it drops to the ground below (guess)."""
 
 _FIRST_CAPACITY = 1024
 
@@ -185,18 +188,27 @@ class Population:
         self.state.spins[sleeping] = 0.0
         self._rest.clear()
 
-    def settle(self, dt_s: float) -> Landed:
-        """Take out the parcels that have come to rest on the ground.
+    def settle(self, site: Site, dt_s: float) -> Landed:
+        """Take out the parcels that have come to rest.
 
         Outside of dig area and box they go as soon as they touch, and so does what is caught between the
-        outside of the bucket and the ground: a parcel there would push the bucket up.
+        outside of the bucket and the ground: a parcel there would push the bucket up. One that has rested elsewhere
+        for long, say on the rim of the box, drops to what is below it.
+
+        Args:
+            site: The ground.
+            dt_s: Duration of the step before.
         """
         state = self.state
-        loose = (state.load == 0) & (state.asleep == 0) & (state.ground != TOUCHES_NOTHING)
+        loose = (state.load == 0) & (state.asleep == 0)
         slow = (state.velocities**2).sum(axis=1) < SETTLING_SPEED_M_S**2
         state.calm_s[:] = np.where(loose & slow, state.calm_s + dt_s, 0.0)
-        caught = loose & (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
-        gone = caught | (loose & (state.ground == TOUCHES_OUTSIDE)) | (state.calm_s >= SETTLING_TIME_S)
+        for i in np.flatnonzero((state.calm_s >= DROPPING_TIME_S) & (state.ground == TOUCHES_NOTHING)):
+            state.ground[i] = ground_below(site, state.positions[i, 0], state.positions[i, 1])[0]
+        grounded = loose & (state.ground != TOUCHES_NOTHING)
+        caught = (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
+        at_rest = state.calm_s >= SETTLING_TIME_S
+        gone = grounded & (caught | at_rest | (state.ground == TOUCHES_OUTSIDE))
         landed = Landed(
             points_w=state.positions[gone, :2],
             masses_kg=state.masses[gone],

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
     LARGEST_PHASE,
+    MOST_COHESION,
     NORMAL_DAMPING,
     SEPARATION_M_S,
     TANGENTIAL_DAMPING,
@@ -64,7 +65,8 @@ def contact(
     roll, springs[3:] = stretch(
         springs[3:], normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt
     )
-    cohesion = law.cohesion * math.pi * radius**2
+    largest_push = normal_stiffness * LARGEST_OVERLAP * radius
+    cohesion = min(law.cohesion * math.pi * radius**2, MOST_COHESION * largest_push)
     return (pressing - cohesion) * normal + slide, roll
 
 

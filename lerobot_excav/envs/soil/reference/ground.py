@@ -64,7 +64,8 @@ def press_ground(state: State, site: Site, law: Law, dt: float) -> None:
             continue
         state.on_ground[i] = 1
         state.ground[i] = place
-        state.positions[i] += float(np.clip(LEAST_GAP * radius - gap, 0.0, LIFT * radius)) * normal
+        if not state.near_plate[i]:
+            state.positions[i] += float(np.clip(LEAST_GAP * radius - gap, 0.0, LIFT * radius)) * normal
         force, torque = wall_contact(
             springs,
             normal,

@@ -64,11 +64,13 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
         beyond = tool.planes[:, :3] @ point_t - tool.planes[:, 3]
         if beyond[1:].max() < 0.0 and beyond[0] < -opening_margin:
             state.shell[i] = SHELTERED
+        state.near_plate[i] = 0
         for k, polygon in enumerate(polygons):
             nearest_t = nearest_point(polygon, point_t)
             surface_velocity = tool.linear + np.cross(tool.angular, rotation @ nearest_t)
             away = rotation @ (point_t - nearest_t)
             touches = _press(state, i, k, away, surface_velocity, law, dt)
+            state.near_plate[i] |= touches
             if touches and beyond[k + 1] > 0.0:
                 state.shell[i] = OUTSIDE_OF_SHELL
 

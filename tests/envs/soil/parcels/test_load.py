@@ -50,7 +50,7 @@ def test_the_load_is_that_of_the_reference(
     state = random_state(rng, 40, [0.8, 0.6, 0.6], centre=near)
     state.velocities[:] *= rng.choice([0.1, 1.0])
     state.ground[:] = TOUCHES_GROUND * (rng.random(40) < 0.02)
-    mass, square_speed, touching = find_load(state, tool)
+    mass, square_speed, _, touching = find_load(state, tool)
     expected = np.array(
         [
             is_load(tool, p, v, r)
@@ -111,7 +111,7 @@ def test_sleeping_parcels_stay_load_and_do_not_count_as_awake_load(
 ) -> None:
     tool = tool_path(pitch=CARRY)
     state = make_state([tool.rotations[0] @ IN_BUCKET] * 2, load=[1, 0], asleep=[1, 0])
-    mass, _, _ = find_load(state, tool)
+    mass, _, _, _ = find_load(state, tool)
     assert mass == pytest.approx(MASS)
     np.testing.assert_array_equal(state.load, [1, 1])
 

@@ -13,7 +13,7 @@ from lerobot_excav.envs.soil.benchmark import BUCKET
 from lerobot_excav.envs.soil.parcels import population as module
 from lerobot_excav.envs.soil.parcels.dynamics import Laws
 from lerobot_excav.envs.soil.parcels.ground import Site
-from lerobot_excav.envs.soil.parcels.plates import ToolPath
+from lerobot_excav.envs.soil.parcels.plates import NO_BOX, ToolPath
 from lerobot_excav.envs.soil.parcels.population import (
     SETTLING_SPEED_M_S,
     SETTLING_TIME_S,
@@ -35,6 +35,10 @@ RADIUS = 0.045
 MASS = 0.94
 TICK = 0.02
 STEPS = 20
+
+NO_GROUND = Site(
+    np.zeros((2, 2)), (0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), (0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0
+)
 
 MakePopulation = Callable[..., Population]
 MakeTool, MakeSite, NoTool = Callable[..., ToolPath], Callable[..., Site], Callable[[int], ToolPath]
@@ -93,7 +97,7 @@ def fallen(
         if tick % 2 == 0:
             add(population, np.array([0.0, 0.0, 0.4]) + rng.uniform(-0.15, 0.15, (4, 3)))
         population.step(tool, site, TICK, cutting=False)
-        landed.append(population.settle(TICK))
+        landed.append(population.settle(NO_GROUND, TICK))
     return landed
 
 
@@ -161,7 +165,7 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
         touching = population.state.ground == TOUCHES_OUTSIDE
         gone = touching & (population.state.load == 0)
-        left += len(population.settle(TICK).masses_kg)
+        left += len(population.settle(NO_GROUND, TICK).masses_kg)
         memory = without(memory, gone)
     assert left >= 8
     assert joined == 2
@@ -178,7 +182,7 @@ def lying(population: Population, **arrays: Any) -> State:
 
 def ticks_until_landed(population: Population) -> int | None:
     for tick in range(1, 20):
-        if len(population.settle(TICK).masses_kg):
+        if len(population.settle(NO_GROUND, TICK).masses_kg):
             return tick
     return None
 
@@ -211,15 +215,15 @@ def test_a_parcel_that_is_fast_or_in_the_air_or_in_the_bucket_stays_a_parcel(
     assert ticks_until_landed(population) is None
 
 
-def test_the_rest_on_the_ground_must_not_be_interrupted(make_population: MakePopulation) -> None:
+def test_the_rest_must_not_be_interrupted(make_population: MakePopulation) -> None:
     population = make_population()
     state = lying(population, ground=TOUCHES_GROUND)
     for _ in range(3):
         for _ in range(4):
-            assert len(population.settle(TICK).masses_kg) == 0
-        state.ground[0] = TOUCHES_NOTHING
-        population.settle(TICK)
-        state.ground[0] = TOUCHES_GROUND
+            assert len(population.settle(NO_GROUND, TICK).masses_kg) == 0
+        state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
+        population.settle(NO_GROUND, TICK)
+        state.velocities[0, 0] = 0.0
 
 
 @pytest.mark.parametrize(
@@ -247,8 +251,8 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
         TOUCHES_GROUND,
         TOUCHES_NOTHING,
     ]
-    population.state.calm_s[:] = 1.0
-    landed = population.settle(TICK)
+    population.state.calm_s[:] = SETTLING_TIME_S
+    landed = population.settle(NO_GROUND, TICK)
     np.testing.assert_array_equal(landed.points_w, [[0.0, 1.0], [6.0, 7.0], [9.0, 10.0]])
     np.testing.assert_allclose(landed.masses_kg, MASS * np.array([1.0, 3.0, 4.0]))
     np.testing.assert_array_equal(landed.is_on_ground, [False, False, True])
@@ -269,7 +273,7 @@ def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothin
         tool = tool_path((0.0, 0.0, top), math.pi, (0.0, 0.0, -0.008), steps=STEPS)
         top -= 0.008
         population.step(tool, site(), TICK, cutting=False)
-        left += len(population.settle(TICK).masses_kg)
+        left += len(population.settle(NO_GROUND, TICK).masses_kg)
     assert top < depth + RADIUS
     assert left == 1
     assert population.state.masses.sum() == 0.0
