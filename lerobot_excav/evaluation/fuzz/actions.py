@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.excavator.operator.path import UnreachableError
 
 Action = NDArray[np.float32]
 Style = Callable[[ExcavatorEnv, np.random.Generator], Iterator[Action]]
@@ -14,6 +15,7 @@ Style = Callable[[ExcavatorEnv, np.random.Generator], Iterator[Action]]
 _LONGEST_HOLD = 30
 _JITTER = 0.05
 _DISTURBANCE = 0.3
+_AWAY_STEPS = 20
 
 
 def noise(env: ExcavatorEnv, rng: np.random.Generator) -> Iterator[Action]:
@@ -65,19 +67,27 @@ def jitter(env: ExcavatorEnv, rng: np.random.Generator) -> Iterator[Action]:
 def dig(env: ExcavatorEnv, rng: np.random.Generator) -> Iterator[Action]:
     """Dig, carry and dump like the scripted operator, with disturbances; then begin again."""
     while True:
-        operator = ScriptedOperator(rng=rng)
-        operator.reset(env)
-        while not operator.done:
-            yield _disturbed(operator.act(env), rng)
+        yield from _operated(env, rng, until="rest")
+        held_for_a_while = held(env, rng)
+        for _ in range(_AWAY_STEPS):
+            yield next(held_for_a_while)
 
 
 def spill(env: ExcavatorEnv, rng: np.random.Generator) -> Iterator[Action]:
     """Dig like the scripted operator until the bucket is loaded, then lose the load by full deflections."""
-    operator = ScriptedOperator(rng=rng)
-    operator.reset(env)
-    while operator.phase in ("reach", "cut", "curl"):
-        yield _disturbed(operator.act(env), rng)
+    yield from _operated(env, rng, until="lift")
     yield from full(env, rng)
+
+
+def _operated(env: ExcavatorEnv, rng: np.random.Generator, *, until: str) -> Iterator[Action]:
+    """Act like the scripted operator, with disturbances, until a phase begins or it can go on no more."""
+    operator = ScriptedOperator(rng=rng)
+    try:
+        operator.reset(env)
+        while operator.phase != until:
+            yield _disturbed(operator.act(env), rng)
+    except UnreachableError:  # disturbed too far: its next path leads out of the machine's reach
+        return
 
 
 STYLES: dict[str, Style] = {

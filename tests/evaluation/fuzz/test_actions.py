@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
+from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.excavator.operator.path import UnreachableError
 from lerobot_excav.evaluation.fuzz.actions import STYLES
 
 
@@ -43,3 +45,13 @@ def test_jitter_ends_in_trembling_around_zero(env):
 def test_press_turns_to_the_pile_first(env):
     swing = env.worksite.machine.joint_pos[0]
     assert drawn("press", env)[0, 0] == -np.sign(swing)
+
+
+@pytest.mark.parametrize("style", ["dig", "spill"])
+@pytest.mark.parametrize("moment", ["reset", "act"])
+def test_a_style_goes_on_where_the_operator_cannot(env, monkeypatch, style, moment):
+    def out_of_reach(*_):
+        raise UnreachableError("too far")
+
+    monkeypatch.setattr(ScriptedOperator, moment, out_of_reach)
+    assert drawn(style, env).shape == (60, 4)
