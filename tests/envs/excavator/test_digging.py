@@ -251,7 +251,7 @@ def test_a_bucket_at_rest_in_soil_stays(machine):
 @pytest.mark.parametrize("pitch", [-1.7, -1.95, -2.2])
 def test_a_bucket_that_stalls_in_deep_soil_holds_still_without_chatter(machine, pitch):
     """The machine pulls as hard as it can; the soil holds it."""
-    soil, speeds = dug_in(machine, pitch, edge_height=0.1), []
+    soil, speeds = dug_in(machine, pitch, height=1.1, edge_height=0.1), []
     for _ in range(120):
         machine.tick(np.array([0.0, -0.2, -1.0, 0.0]), soil.step(const.TICK_S, machine.tool()))
         speeds.append(machine.joint_vel)

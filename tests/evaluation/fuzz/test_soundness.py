@@ -17,6 +17,7 @@ def sound_soil():
         container_heights_m=HEIGHTS.copy(),
         fidelity=FIDELITIES["standard"],
         awake_parcel_count=2,
+        parcel_is_load=np.zeros(2, dtype=bool),
         parcel_positions_w=np.zeros((2, 3)),
         parcel_velocities_w=np.zeros((2, 3)),
         parcel_masses_kg=np.ones(2),
