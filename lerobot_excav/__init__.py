@@ -6,7 +6,7 @@ Map of the package; dependencies run from top to bottom:
 - `envs.excavator`: machine, scenes, targets, task and scripted operator.
 - `robots`, `teleoperators`: the same machine as LeRobot devices.
 - `datasets`: paired demonstrations, their schema and their index.
-- `evaluation`: metrics, intervals and reports.
+- `evaluation`: metrics, intervals and reports; validation, fuzz and film of the soil.
 - `scripts`: the subcommands of `lerobot-excav`.
 - `policies`: `mask_act`; imports LeRobot only.
 - `plugin`: the one list of what is registered with LeRobot.

@@ -52,6 +52,11 @@ def test_make_targets_of_the_readme_exist():
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
 
 
+def test_the_readme_shows_every_part_of_the_soils_test():
+    for command in ("bench soil --quick", "bench fuzz", "bench soil --video"):
+        assert any(f"lerobot-excav {command}" in shown for shown in commands()), command
+
+
 def test_readme_has_no_gaps():
     assert "PLACEHOLDER" not in README
 
@@ -83,4 +88,5 @@ def test_every_command_of_the_readme_runs(tmp_path):
         ran.append(words[0])
     assert {"lerobot-excav", "lerobot-train", "lerobot-eval", "lerobot-record", "lerobot-replay"} <= set(ran)
     assert list((tmp_path / "outputs/eval").rglob("*.mp4"))
+    assert (tmp_path / "outputs/dig.mp4").stat().st_size > 0
     assert (tmp_path / "outputs/report/report.md").read_text().count("target") > 0

@@ -28,6 +28,8 @@ Image = NDArray[np.uint8]
 def write_video(path: Path, *, height: int = 480, width: int = 848) -> None:
     """Film the scripted operator's cycle in a scene of the set `train` from the side.
 
+    The file appears when the film is complete.
+
     Args:
         path: File to write (mp4); its folder is made.
         height: Height of the picture [px], even.
@@ -37,13 +39,15 @@ def write_video(path: Path, *, height: int = 480, width: int = 848) -> None:
         RenderingError: Pictures cannot be made on this machine.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with av.open(str(path), mode="w") as container:
+    partial = path.with_name(f"{path.name}.partial")
+    with av.open(str(partial), mode="w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(FRAMES_PER_SECOND))
         stream.height, stream.width, stream.pix_fmt = height, width, "yuv420p"
         stream.options = {"crf": str(_QUALITY)}
         for image in _pictures(height, width):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
         container.mux(stream.encode(None))
+    partial.replace(path)
 
 
 def ticks_per_picture(phase: str, *, payload_kg: float, airborne_kg: float) -> int:

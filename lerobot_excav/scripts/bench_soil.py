@@ -10,6 +10,8 @@ Examples:
       everything; experiments made with one kind of sand keep to it
   lerobot-excav bench soil --report
       everything, and docs/soil_validation.md with docs/images/soil/*.png
+  lerobot-excav bench soil --quick --only=T1 --report --out=outputs/columns.md
+      the report of a part, with its plots in outputs/images/soil
   lerobot-excav bench soil --video=outputs/dig.mp4
       a dig in slow motion instead of the experiments
 
@@ -48,7 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--quick", dest="is_quick", action="store_true", help="fewer repetitions, the same gates"
     )
     parser.add_argument("--report", action="store_true", help="write the report with its plots")
-    parser.add_argument("--out", type=Path, help=f"where to write the report (default: {REPORT})")
+    parser.add_argument(
+        "--out", type=Path, help=f"where to write the report (default: {REPORT}, for the whole of it only)"
+    )
     parser.add_argument("--json", dest="values", type=Path, help="also write the values to this file")
     parser.add_argument(
         "--video", type=Path, help="film a dig in slow motion into this mp4 file, and nothing else"
@@ -60,6 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
     require(arguments.out is None or arguments.report, "--out names the report; add --report")
     if arguments.video is not None:
         return _film(arguments)
+    _require_whole_report(arguments)
+    for path in (arguments.values, arguments.out):
+        _require_file(path)
     from lerobot_excav.evaluation.soil_validation.catalogue import chosen
     from lerobot_excav.evaluation.soil_validation.experiment import Conditions
     from lerobot_excav.evaluation.soil_validation.report import summary_text, write_report
@@ -94,11 +101,37 @@ def _film(arguments: argparse.Namespace) -> int:
     }
     for option, value in given.items():
         require(value is None, f"{option} has no effect on `bench soil --video`; leave it out")
+    require(arguments.video.suffix == ".mp4", f"--video={arguments.video} must end in .mp4")
+    _require_file(arguments.video)
     from lerobot_excav.evaluation.soil_video import write_video
 
     write_video(arguments.video)
     print(f"written: {arguments.video}")
     return 0
+
+
+def _require_whole_report(arguments: argparse.Namespace) -> None:
+    """Let nothing but all experiments, at their default settings, replace the report of the repository."""
+    if not arguments.report or arguments.out is not None:
+        return
+    given = {
+        "--only": arguments.experiments,
+        "--soil": arguments.preset,
+        "--fidelity": arguments.fidelity,
+        "--seeds": arguments.seeds,
+        "--quick": arguments.is_quick or None,
+    }
+    for option, value in given.items():
+        require(
+            value is None, f"{option} with --report would replace {REPORT} by another report; add --out=FILE"
+        )
+
+
+def _require_file(path: Path | None) -> None:
+    """Refuse a file that cannot be written before the experiments run, not after."""
+    if path is not None:
+        require(not path.is_dir(), f"{path} is a folder; name a file in it")
+        path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def _seeds(text: str) -> tuple[int, ...]:
@@ -116,5 +149,4 @@ def _write_values(path: Path, conditions: "Conditions", outcomes: "list[Outcome]
         "quick": conditions.quick,
         "experiments": {experiment.code: result.as_dict() for experiment, result in outcomes},
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n")

@@ -63,6 +63,11 @@ def test_values_and_report_are_written(asked, tmp_path, capsys):
         (["--video=x.mp4", "--quick"], "--quick"),
         (["--video=x.mp4", "--only=T1"], "--only"),
         (["--video=x.mp4", "--soil=sand"], "--soil"),
+        (["--video=x.avi"], "must end in .mp4"),
+        (["--report", "--only=T1"], "--only with --report would replace"),
+        (["--report", "--quick"], "--quick with --report would replace"),
+        (["--report", "--soil=gravel"], "--soil with --report would replace"),
+        (["--json=."], "name a file"),
     ],
 )
 def test_options_that_cannot_be_are_named(asked, options, named, capsys, tmp_path, monkeypatch):
@@ -70,6 +75,12 @@ def test_options_that_cannot_be_are_named(asked, options, named, capsys, tmp_pat
     assert main(["bench", "soil", *options]) == 2
     assert named in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_experiments_run(asked, capsys, tmp_path):
+    assert main(["bench", "soil", f"--json={tmp_path}"]) == 2
+    assert str(tmp_path) in capsys.readouterr().err
+    assert not asked
 
 
 @pytest.mark.parametrize("option", ["--quick", "--only=soil", "--json=x.json", "--workers=3"])

@@ -5,6 +5,7 @@ import os
 import platform
 from pathlib import Path
 
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
 from lerobot_excav.evaluation.soil_validation.plots import draw
 from lerobot_excav.evaluation.soil_validation.results import Check, Result, Table, number_text
@@ -66,7 +67,8 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
         + f"Conditions: soil `{conditions.preset}` where an experiment does not name its own, fidelity "
         f"`{conditions.fidelity}`, seeds {seeds}"
         + (", quick (fewer repetitions)" if conditions.quick else "")
-        + f"; lerobot_env_excav {importlib.metadata.version('lerobot_env_excav')}, "
+        + f"; lerobot_env_excav {importlib.metadata.version('lerobot_env_excav')}, version {SIMULATION_VERSION} "
+        "of the simulation, "
         f"{platform.machine()} with {os.cpu_count()} cores.\n\n"
         "How the soil works: [soil.md](soil.md). Every experiment is one file in "
         "`lerobot_excav/evaluation/soil_validation/` and uses the soil's public surface only."

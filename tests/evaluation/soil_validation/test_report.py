@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.soil_validation.catalogue import EXPERIMENTS, chosen
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
@@ -51,6 +52,12 @@ def test_a_missed_gate_is_told_with_its_distance_and_its_reason():
     assert "**missed** by 0.2" in text
     assert "**Missed: run-out of 30°**, by 0.2. Too few parcels." in text
     assert "**Missed: fall time**" not in text
+
+
+def test_the_report_names_the_version_of_the_simulation():
+    assert f"version {SIMULATION_VERSION} of the simulation" in report_text(
+        [(experiment(), RESULT)], Conditions()
+    )
 
 
 def test_a_miss_that_nobody_has_explained_says_so():
