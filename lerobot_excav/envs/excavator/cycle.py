@@ -11,7 +11,7 @@ from lerobot_excav.envs.excavator.task_state import TaskMeter, TaskState
 from lerobot_excav.envs.excavator.worksite import Worksite
 
 LOADING_ONSET_KG = 20.0
-"""Payload at which a bucket counts as loading, and below which it counts as emptied [kg] (design §6)."""
+"""Payload at which a bucket counts as loading, and below which it counts as emptied [kg]."""
 
 LEAST_RETAINED_KG = 100.0
 """Retained mass of an effective scoop [kg] (paper's code family)."""
