@@ -1,6 +1,7 @@
 """The bucket in the soil: where it was, what it cuts, what enters it."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
@@ -43,14 +44,15 @@ def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
     return geometry.struck_volume_m3 + slope_tan * (a**2 * b / 4 - a**3 / 12)
 
 
-def _require_no_jump(geometry: ToolGeometry, before: Pose | None, now: Pose) -> None:
-    """Refuse a motion that no machine makes within a step."""
+def _checked_motion(geometry: ToolGeometry, before: Pose | None, now: Pose) -> float:
+    """Return how far the tool moved [m]; refuse a motion that no machine makes within a step."""
     moved = 0.0 if before is None else largest_motion(geometry.corners_t, before, now)
     require(
         moved <= LARGEST_MOTION_M,
         f"tool moved {moved:.3g} m in one step; allowed: {LARGEST_MOTION_M} m. "
         "After placing the machine by hand, reset the soil or step once with tool=None.",
     )
+    return moved
 
 
 class Bucket:
@@ -108,19 +110,21 @@ class Bucket:
         """
         pose = Pose.of(tool, floor_depth_m)
         geometry = tool.geometry
-        _require_no_jump(geometry, self.pose, pose)
+        motion_m = _checked_motion(geometry, self.pose, pose)
         before, self.pose = self.pose, pose
         if self.intake is None or not self.intake.belongs_to(geometry):
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
             self.intake.volumes[0, 0] = waiting_m3
-        moved = (0.0, 0.0)
+        volumes_m3 = (0.0, 0.0)
         if before is not None:
             most = heaped_volume_m3(geometry, self._parameters.slope_tan) / self._parameters.swell
             room = max(0.0, most - load_m3 - self.waiting_m3)
-            moved = self._sweep(geometry, before, pose, field, self.intake, room)
+            steps = max(1, math.ceil(motion_m / (self._fidelity.substep_cells * min(field.grid[2:]))))
+            path = poses_between(before, pose, steps)
+            volumes_m3 = self._sweep(geometry, path, field, self.intake, room)
         self._cover(geometry, pose, field)
-        return moved
+        return volumes_m3
 
     def births(self, *, all_of_it: bool, rng: Generator) -> tuple[Array, Array]:
         """Turn what waits into parcels, without pose.
@@ -148,16 +152,13 @@ class Bucket:
     def _sweep(
         self,
         geometry: ToolGeometry,
-        before: Pose,
-        now: Pose,
+        path: Iterator[tuple[Pose, Pose]],
         field: HeightField,
         intake: Intake,
         room: float,
     ) -> tuple[float, float]:
-        moved = largest_motion(geometry.corners_t, before, now)
-        steps = max(1, math.ceil(moved / (self._fidelity.substep_cells * min(field.grid[2:]))))
         entered, lost = 0.0, 0.0
-        for start, end in poses_between(before, now, steps):
+        for start, end in path:
             more, over = cut(
                 field.heights,
                 field.active,
