@@ -1,0 +1,52 @@
+"""Where things are in the work cell; world frame, z up, the table top at z = 0 [m].
+
+Positions follow the published scene of the same task where they say so.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+BASE_POS_W = (0.5, 0.5, 0.0)
+"""Foot of the arm, not turned: it works towards -x (kind: paper)."""
+
+BLOCK_COUNT = 4
+BLOCK_SIZE_M = 0.04  # edge (kind: paper)
+BLOCK_MASS_KG = 0.05  # kind: paper
+BLOCK_FRICTION = (1.0, 0.005, 0.0001)  # painted wood on a table top (kind: guess)
+
+BLOCK_AREA_X_W = (0.0, 0.2)
+BLOCK_AREA_Y_W = (0.4, 0.6)
+"""Where the centres of the blocks may lie: the published area of targets, since every block may be one (kind: paper)."""
+BLOCK_SPACING_M = 0.08
+"""Least distance of two centres [m]; the published 0.07 leaves the open fingers 2 mm on either side (kind: tuned)."""
+BLOCK_YAW_RAD = 0.1  # largest turn of a block about z (kind: guess)
+
+TRAY_POS_W = (0.42, 0.75)
+TRAY_RADIUS_M, TRAY_HEIGHT_M = 0.08, 0.02  # kind: paper
+TRAY_RIM_M = 0.012  # height of the rim above the tray's floor (kind: guess)
+
+
+class CameraPose(NamedTuple):
+    """A fixed camera: where it stands, what it looks at [m], and its vertical field of view [deg]."""
+
+    pos_w: tuple[float, float, float]
+    look_at_w: tuple[float, float, float]
+    fovy_deg: float
+
+
+CAMERAS = {
+    "main": CameraPose((0.62, 0.60, 0.62), (0.10, 0.52, 0.0), 58.0),
+    "top": CameraPose((0.0, 0.6, 0.8), (0.05, 0.55, 0.0), 78.0),
+    "overview": CameraPose((-0.75, 0.05, 0.75), (0.25, 0.5, 0.15), 50.0),
+}
+
+
+def block_rest_height_m() -> float:
+    """Return the height of a block's centre when it lies on the table [m]."""
+    return 0.5 * BLOCK_SIZE_M
+
+
+def over_tray(pos_w: np.ndarray) -> bool:
+    """Return whether a point is above the tray's floor, position (3,) [m]."""
+    return bool(np.hypot(pos_w[0] - TRAY_POS_W[0], pos_w[1] - TRAY_POS_W[1]) < TRAY_RADIUS_M)
