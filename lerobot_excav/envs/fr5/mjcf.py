@@ -51,9 +51,16 @@ def _set_options(spec: mujoco.MjSpec) -> None:
 
 
 def _add_table(spec: mujoco.MjSpec) -> None:
+    # No highlights: on a bare table they are brighter than any block, and wander with the camera.
     spec.worldbody.add_light(
-        name="lamp", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[0, 0, 3], dir=[0, 0, -1]
+        name="lamp",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[0, 0, 3],
+        dir=[0, 0, -1],
+        specular=[0, 0, 0],
+        ambient=[0.25, 0.25, 0.25],
     )
+    spec.visual.headlight.active = 0
     spec.worldbody.add_geom(
         name="table",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -114,8 +121,9 @@ def _add_camera(spec: mujoco.MjSpec, name: str, pose: layout.CameraPose) -> None
     up = np.array([0.0, 0.0, 1.0]) if abs(backward[2]) < 0.99 else np.array([-1.0, 0.0, 0.0])
     right = np.cross(up, backward)
     right /= np.linalg.norm(right)
-    camera = spec.worldbody.add_camera(name=name, pos=pose.pos_w, fovy=pose.fovy_deg)
-    camera.alt.xyaxes = np.concatenate([right, np.cross(backward, right)])
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(backward, right), backward], axis=1).ravel())
+    spec.worldbody.add_camera(name=name, pos=list(pose.pos_w), quat=quat.tolist(), fovy=pose.fovy_deg)
 
 
 def _collision(kind: Kind) -> dict[str, int]:
