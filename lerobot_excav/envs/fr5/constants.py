@@ -87,6 +87,7 @@ PAD_THICKNESS_M, PAD_LENGTH_M = 0.012, 0.045  # kind: derived
 FINGER_FORCE_N = 30.0
 """Largest force of each finger [N] (manual, from memory; kind: guess)."""
 FINGER_STIFFNESS_N_M = 3000.0  # kind: tuned: full force from 10 mm of error on
+FINGER_DAMPING_N_S_M = 30.0  # kind: derived, near critical with the motor's inertia
 FINGER_SPEED_M_S = 0.15  # stroke in 0.4 s (drive settings in public use: 0.35 to 0.45 s; kind: derived)
 PAD_FRICTION = (1.5, 0.05, 0.0001)
 """Sliding [1], torsional [m] and rolling [m] friction of rubber pads (kind: guess, from the range 1.2 to 2)."""

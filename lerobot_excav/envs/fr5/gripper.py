@@ -7,7 +7,9 @@ from lerobot_excav.envs.fr5.geoms import ARM, HARD_SOLREF, Kind
 
 _HAND_RGBA = (0.16, 0.17, 0.19, 1.0)
 _PAD_RGBA = (0.05, 0.05, 0.06, 1.0)
-_DAMPING_N_S_M = const.FINGER_FORCE_N / const.FINGER_SPEED_M_S  # at full force the finger runs at its full speed
+_DAMPING_N_S_M = (
+    const.FINGER_FORCE_N / const.FINGER_SPEED_M_S
+)  # at full force the finger runs at its full speed
 _ROD_LENGTH_M = const.PAD_CENTRE_M - 0.5 * const.PAD_LENGTH_M - const.HAND_LENGTH_M
 
 
@@ -88,7 +90,7 @@ def _add_motor(spec: mujoco.MjSpec) -> None:
     for name in const.FINGER_NAMES:
         tendon.wrap_joint(name, 0.5)
     motor = spec.add_actuator(name="gripper", target="fingers", trntype=mujoco.mjtTrn.mjTRN_TENDON)
-    motor.set_to_position(kp=2 * const.FINGER_STIFFNESS_N_M, kv=2 * _DAMPING_N_S_M)
+    motor.set_to_position(kp=2 * const.FINGER_STIFFNESS_N_M, kv=2 * const.FINGER_DAMPING_N_S_M)
     motor.ctrllimited, motor.ctrlrange = True, [0.0, const.FINGER_STROKE_M]
     force = 2 * const.FINGER_FORCE_N
     motor.forcelimited, motor.forcerange = True, [-force, force]

@@ -6,6 +6,7 @@ Positions follow the published scene of the same task where they say so.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 BASE_POS_W = (0.5, 0.5, 0.0)
 """Foot of the arm, not turned: it works towards -x (kind: paper)."""
@@ -17,7 +18,7 @@ BLOCK_FRICTION = (1.0, 0.005, 0.0001)  # painted wood on a table top (kind: gues
 
 BLOCK_AREA_X_W = (0.0, 0.2)
 BLOCK_AREA_Y_W = (0.4, 0.6)
-"""Where the centres of the blocks may lie: the published area of targets, since every block may be one (kind: paper)."""
+"""Where the centres of the blocks may lie: the published area of targets, as every block may be one (kind: paper)."""
 BLOCK_SPACING_M = 0.08
 """Least distance of two centres [m]; the published 0.07 leaves the open fingers 2 mm on either side (kind: tuned)."""
 BLOCK_YAW_RAD = 0.1  # largest turn of a block about z (kind: guess)
@@ -49,6 +50,6 @@ def block_rest_height_m() -> float:
     return 0.5 * BLOCK_SIZE_M
 
 
-def over_tray(pos_w: np.ndarray) -> bool:
+def over_tray(pos_w: NDArray[np.float64]) -> bool:
     """Return whether a point is above the tray's floor, position (3,) [m]."""
     return bool(np.hypot(pos_w[0] - TRAY_POS_W[0], pos_w[1] - TRAY_POS_W[1]) < TRAY_RADIUS_M)

@@ -98,4 +98,6 @@ def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
         if distance[np.triu_indices(layout.BLOCK_COUNT, 1)].min() >= layout.BLOCK_SPACING_M:
             height = np.full((layout.BLOCK_COUNT, 1), layout.block_rest_height_m())
             return np.concatenate([xy_w, height], axis=1)
-    raise ExcavError(f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene")
+    raise ExcavError(
+        f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene"
+    )

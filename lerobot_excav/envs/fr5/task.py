@@ -47,7 +47,7 @@ class GraspTask:
     | 0 | anything else |
 
     The published experiment has the same maximum and returns 658 to 704 for its successes. The scripted operator's 400
-    frames return about 870 here, because it rests longer at the end.
+    frames return about 900 here, because it rests longer at the end.
 
     Args:
         workcell: Arm and blocks, already reset to the scene.

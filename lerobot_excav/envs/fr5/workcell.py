@@ -17,6 +17,14 @@ _SETTLE_TICKS = 10  # 0.2 s, for blocks to find their contact with the table
 ACTION_LOW = np.append(const.JOINT_LIMITS_RAD[:, 0], 0.0)
 ACTION_HIGH = np.append(const.JOINT_LIMITS_RAD[:, 1], 1.0)
 
+_CTRL_SCALE = np.append(
+    np.ones(6), const.FINGER_STROKE_M
+)  # from an action to what the servos are given [rad, m]
+_REFERENCE_STEP = const.SUBSTEP_S * np.append(
+    const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M
+)
+"""How far the servos' reference may move in a substep: the speed limits [rad, 1]."""
+
 
 class Workcell:
     """Arm, gripper, four blocks and a tray.
@@ -38,7 +46,7 @@ class Workcell:
         self._block_qvel = np.array([self.model.joint(name).dofadr[0] for name in blocks])
         self._block_geoms = {self.model.geom(name).id: i for i, name in enumerate(blocks)}
         self._pads = {self.model.geom(f"{name}_pad").id: i for i, name in enumerate(const.FINGER_NAMES)}
-        self._reference = np.zeros(ACTION_SIZE - 1)
+        self._reference: NDArray[np.float64] = np.zeros(ACTION_SIZE)
 
     def reset(self, scene: GraspScene) -> None:
         """Put the cell into a scene's starting state, at rest.
@@ -53,7 +61,7 @@ class Workcell:
             self.data.qpos[start : start + 7] = [*position_w, np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]
         self.data.qpos[self._qpos[:6]] = scene.joint_pos
         self.data.qpos[self._qpos[6:]] = const.FINGER_STROKE_M
-        self._reference = scene.joint_pos.copy()
+        self._reference = np.append(scene.joint_pos, 1.0)
         mujoco.mj_forward(self.model, self.data)
         for _ in range(_SETTLE_TICKS):
             self.tick(np.append(scene.joint_pos, 1.0))
@@ -62,7 +70,7 @@ class Workcell:
     def tick(self, action: NDArray[np.float64]) -> None:
         """Advance by one control tick of 0.02 s.
 
-        The servos follow the targets at no more than the joints' speed limits.
+        The servos follow the targets at no more than the speed limits of joints and fingers.
 
         Args:
             action: Joint position targets [rad] and gripper target [0..1], (7,); clipped to what the arm can do.
@@ -78,14 +86,16 @@ class Workcell:
             "the gripper's opening [0..1]",
         )
         target = np.clip(action, ACTION_LOW, ACTION_HIGH)
-        step = const.JOINT_SPEED_RAD_S * const.SUBSTEP_S
-        self.data.ctrl[6] = const.FINGER_STROKE_M * target[6]
         for _ in range(_SUBSTEPS):
-            self._reference = self._reference + np.clip(target[:6] - self._reference, -step, step)
-            self.data.ctrl[:6] = self._reference
+            self._reference = self._reference + np.clip(
+                target - self._reference, -_REFERENCE_STEP, _REFERENCE_STEP
+            )
+            self.data.ctrl[:] = self._reference * _CTRL_SCALE
             mujoco.mj_step(self.model, self.data)
         if self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
-            raise ExcavError(f"the simulation diverged at {self.data.time:.3f} s; report this scene and action")
+            raise ExcavError(
+                f"the simulation diverged at {self.data.time:.3f} s; report this scene and action"
+            )
 
     @property
     def joint_pos(self) -> NDArray[np.float64]:

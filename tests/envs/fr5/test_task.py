@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.fr5 import layout
+from lerobot_excav.envs.fr5.scene import draw_scene
+from lerobot_excav.envs.fr5.task import NO_BLOCK, TASK_STATE_NAMES, GraspTask
+from lerobot_excav.errors import ConfigurationError
+
+SCENE = draw_scene("train", 2)
+IN_TRAY = (*layout.TRAY_POS_W, layout.TRAY_HEIGHT_M + layout.block_rest_height_m())
+
+
+def put(workcell, block, position_w):
+    joint = workcell.data.joint(f"block{block}")
+    joint.qpos[:] = [*position_w, 1, 0, 0, 0]
+    joint.qvel[:] = 0
+
+
+def hold(workcell, ticks=5):
+    for _ in range(ticks):
+        workcell.tick(np.append(SCENE.joint_pos, 1.0))
+
+
+@pytest.fixture
+def task(workcell):
+    workcell.reset(SCENE)
+    return GraspTask(workcell, SCENE, 1)
+
+
+def test_nothing_done_is_worth_nothing(task, workcell):
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert task.episode_metrics["first_grasped_block"] == NO_BLOCK
+
+
+def test_the_commanded_block_alone_in_the_tray_is_success(task, workcell):
+    put(workcell, 1, IN_TRAY)
+    hold(workcell)
+    assert task.update() == 4.0
+    assert task.is_success
+
+
+def test_another_block_in_the_tray_is_no_success(task, workcell):
+    put(workcell, 2, IN_TRAY)
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert task.episode_metrics["blocks_in_tray"] == 1
+    assert not task.episode_metrics["target_in_tray"]
+
+
+def test_a_second_block_in_the_tray_spoils_the_success(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (-0.03, 0, 0)))
+    put(workcell, 3, np.add(IN_TRAY, (0.03, 0, 0)))
+    hold(workcell)
+    task.update()
+    assert not task.is_success
+    assert task.episode_metrics["blocks_in_tray"] == 2
+
+
+def test_a_block_that_still_moves_does_not_rest(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (0, 0, 0.008)))
+    workcell.data.joint("block1").qvel[0] = 0.3
+    hold(workcell, 1)
+    task.update()
+    assert not task.is_success
+
+
+def test_stages_of_the_reward_come_in_order_and_end_at_their_greatest(play):
+    task, rewards, _ = play(2, 1)
+    assert task.is_success
+    assert set(rewards) == {0.0, 1.0, 2.0, 3.0, 4.0}
+    first = [int(np.argmax(rewards == stage)) for stage in (1.0, 2.0, 3.0, 4.0)]
+    assert first == sorted(first)
+    assert rewards[-1] == 4.0
+    assert task.episode_metrics["episode_return"] == rewards.sum() > 700
+    assert task.episode_metrics["max_reward"] == 4.0
+
+
+def test_first_grasped_block_is_remembered(play):
+    task, _, _ = play(2, 3)
+    assert task.episode_metrics["first_grasped_block"] == 3
+    assert task.episode_metrics["target_grasped"]
+
+
+def test_task_state_tells_of_the_commanded_block(task, workcell):
+    hold(workcell)
+    task.update()
+    state = dict(zip(TASK_STATE_NAMES, task.task_state, strict=True))
+    distance = np.linalg.norm(workcell.block_pos_w[1] - workcell.grasp_pos_w)
+    assert state["gripper_to_target_m"] == pytest.approx(distance, rel=1e-6)
+    assert state["target_height_m"] == pytest.approx(0.0, abs=1e-3)
+    assert state["first_grasped_block"] == NO_BLOCK
+
+
+def test_a_new_command_is_what_success_is_judged_by(task, workcell):
+    put(workcell, 2, IN_TRAY)
+    task.retarget(2)
+    hold(workcell)
+    assert task.update() == 4.0
+    assert task.is_success
+    assert task.episode_metrics["target_id"] == 1
+    assert task.episode_metrics["final_target_id"] == 2
+
+
+@pytest.mark.parametrize("target_id", [-1, 4])
+def test_an_unknown_block_is_refused(task, target_id):
+    with pytest.raises(ConfigurationError, match="target_id"):
+        task.retarget(target_id)
