@@ -8,6 +8,7 @@ RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 DEMO := outputs/demo
 STEPS ?= 200000
+JOBS ?= 1
 
 # No GPU and no display are needed: pictures come from EGL. LeRobot asks no hub for anything.
 export MUJOCO_GL ?= egl
@@ -15,10 +16,10 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test fuzz lint type wheel clean
+.PHONY: help setup demo table-manipulation test fuzz lint type wheel clean
 
 help: ## list the targets
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
 
 setup: $(READY) ## install everything into .venv
 
@@ -39,6 +40,9 @@ $(READY): pyproject.toml uv.lock
 
 demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
+
+table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; goes on where it stopped; JOBS=2)
+	@$(RUN)/lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=$(JOBS)
 
 test: $(READY) ## run the test suite
 	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal

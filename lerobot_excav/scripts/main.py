@@ -13,6 +13,7 @@ COMMANDS = {
     "index": "rebuild the paired-scene index, complete a recording, print lerobot-train's episode flags",
     "qc": "check a dataset and replay a sample of its episodes",
     "report": "make the table of one or more evaluations, with intervals and comparisons",
+    "experiment": "run the stages of an experiment that are not finished",
     "bench": "measure this machine or the scripted operator; put the soil to the test",
 }
 
@@ -81,7 +82,7 @@ def command_parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
 
 
 def _overview() -> argparse.ArgumentParser:
-    commands = "\n".join(f"  {name:8} {summary}" for name, summary in COMMANDS.items())
+    commands = "\n".join(f"  {name:10} {summary}" for name, summary in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog="lerobot-excav",
         usage="lerobot-excav COMMAND [options]",

@@ -1,0 +1,115 @@
+"""Running the stages of an experiment that are not finished, one or several at a time."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.evaluation.experiment.experiment import Experiment
+from lerobot_excav.evaluation.experiment.stage import Stage
+from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
+from lerobot_excav.evaluation.experiment.stage_run import StageRun
+
+POLL_S = 0.2
+
+Say = Callable[[str], None]
+
+
+def state(stage: Stage) -> str:
+    """Say in a word how far a stage is: `finished`, `changed`, `interrupted`, `to do` or `always`.
+
+    `changed`: the result was made by another command than the file has now; it is kept.
+    """
+    if stage.makes is None:
+        return "always"
+    if stage.is_finished:
+        record = read_record(stage.makes)
+        return "finished" if record is None or record.command == stage.command else "changed"
+    return "interrupted" if stage.is_started else "to do"
+
+
+def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int, say: Say) -> bool:
+    """Run the unfinished ones of some stages, each after those it needs.
+
+    After a failure no further stage is started. An interruption (Ctrl-C) ends what is running.
+
+    Args:
+        experiment: The experiment.
+        stages: Stages of it.
+        jobs: How many may run at a time.
+        say: Takes lines for the user.
+
+    Returns:
+        Whether all succeeded.
+
+    Raises:
+        ConfigurationError: `jobs` is not positive, a needed stage is neither finished nor chosen, or another process
+            is at a stage.
+    """
+    require(jobs >= 1, f"--jobs={jobs} must be at least 1")
+    waiting = [stage for stage in stages if not stage.is_finished]
+    _require_needs(experiment, waiting)
+    _tell_finished(stages, say)
+    running: list[StageRun] = []
+    failed: list[str] = []
+    try:
+        while running or (waiting and not failed):
+            if not failed:
+                _start_ready(experiment, waiting, running, jobs, say)
+            for ended in [run for run in running if run.exit_code is not None]:
+                running.remove(ended)
+                if not _end(ended, say):
+                    failed.append(ended.stage.name)
+            time.sleep(POLL_S)
+    except (KeyboardInterrupt, ConfigurationError):
+        for run in running:
+            run.stop()
+            run.finish()
+        raise
+    return not failed
+
+
+def _require_needs(experiment: Experiment, waiting: Sequence[Stage]) -> None:
+    chosen = {stage.name for stage in waiting}
+    for stage in waiting:
+        for need in stage.needs:
+            require(
+                need in chosen or experiment.stage(need).is_finished,
+                f"stage {stage.name} needs {need}, which is not finished; add it: --only {need} {stage.name}",
+            )
+
+
+def _tell_finished(stages: Sequence[Stage], say: Say) -> None:
+    for stage in stages:
+        if stage.is_finished:
+            hint = " by another command than the file has now; remove it to run the stage again"
+            say(f"= {stage.name}: {stage.makes} is finished{hint if state(stage) == 'changed' else ''}")
+
+
+def _start_ready(
+    experiment: Experiment, waiting: list[Stage], running: list[StageRun], jobs: int, say: Say
+) -> None:
+    pending = {stage.name for stage in waiting} | {run.stage.name for run in running}
+    ready = [stage for stage in waiting if not pending.intersection(stage.needs)]
+    for stage in ready[: max(0, jobs - len(running))]:
+        waiting.remove(stage)
+        log = experiment_log(experiment, stage)
+        say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
+        say("    " + " && \\\n    ".join(stage.shell_lines()))
+        running.append(StageRun(stage, experiment.environment, log))
+
+
+def experiment_log(experiment: Experiment, stage: Stage) -> Path:
+    """Return the file that takes a stage's output."""
+    if stage.makes is not None:
+        return log_path(stage.makes)
+    return Path("outputs") / f"{experiment.path.stem}-{stage.name}.log"
+
+
+def _end(run: StageRun, say: Say) -> bool:
+    succeeded = run.finish()
+    verdict = "finished" if succeeded else f"FAILED with exit code {run.exit_code}, see {run.log}"
+    say(f"{'=' if succeeded else '!'} {run.stage.name}: {verdict} after {run.wall_s / 60:.1f} min")
+    if succeeded and run.stage.makes is None:
+        say(run.output())
+    return succeeded

@@ -1,0 +1,96 @@
+"""What was run to make a result: `RESULT.json` beside it, and its output in `RESULT.log`."""
+
+import json
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("lerobot_env_excav", "lerobot", "torch", "mujoco", "numpy")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRecord:
+    """Command, code and time of a stage.
+
+    Attributes:
+        stage: Name of the stage.
+        command: The command that began the result, for bash.
+        environment: Variables that the experiment gave it.
+        commit: Commit of this repository; None outside of one.
+        modified: Whether the package differed from that commit.
+        packages: Versions by distribution.
+        attempts: Of every run: `started` (UTC), `wall_s`, `exit_code`.
+    """
+
+    stage: str
+    command: str
+    environment: Mapping[str, str]
+    commit: str | None
+    modified: bool
+    packages: Mapping[str, str]
+    attempts: Sequence[Mapping[str, Any]] = field(default_factory=list)
+
+    @property
+    def wall_s(self) -> float:
+        """Time of all runs [s]."""
+        return float(sum(attempt["wall_s"] for attempt in self.attempts))
+
+    def write(self, makes: Path) -> None:
+        """Write the record of a result."""
+        record_path(makes).write_text(json.dumps(asdict(self), indent=1) + "\n")
+
+
+def record_path(makes: Path) -> Path:
+    """Return where the record of a result lies."""
+    return makes.with_name(f"{makes.name}.json")
+
+
+def log_path(makes: Path) -> Path:
+    """Return where the output of a result's command lies."""
+    return makes.with_name(f"{makes.name}.log")
+
+
+def read_record(makes: Path) -> StageRecord | None:
+    """Read the record of a result; None if it has none, as when its command was run by hand."""
+    path = record_path(makes)
+    return StageRecord(**json.loads(path.read_text())) if path.is_file() else None
+
+
+def new_record(stage: str, command: str, environment: Mapping[str, str]) -> StageRecord:
+    """Describe a command that is about to be run."""
+    commit, modified = _code()
+    return StageRecord(
+        stage=stage,
+        command=command,
+        environment=dict(environment),
+        commit=commit,
+        modified=modified,
+        packages={name: version(name) for name in PACKAGES},
+    )
+
+
+def attempt(started: datetime, *, wall_s: float, exit_code: int) -> dict[str, Any]:
+    """Describe one run of a command."""
+    text = started.astimezone(UTC).isoformat(timespec="seconds")
+    return {"started": text, "wall_s": round(wall_s, 1), "exit_code": exit_code}
+
+
+def _code() -> tuple[str | None, bool]:
+    """Return the commit of the package's repository, and whether the package differs from it."""
+    package = Path(__file__).parents[2]
+    commit = _git(package, "rev-parse", "HEAD")
+    changes = _git(package, "status", "--porcelain", "--", ".")
+    return commit or None, bool(changes)
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    """Return git's answer; an empty one where there is no git, or no repository."""
+    try:
+        done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    except OSError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""

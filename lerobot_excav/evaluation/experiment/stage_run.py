@@ -1,0 +1,122 @@
+"""Running a stage once."""
+
+import fcntl
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.experiment.stage import Stage
+from lerobot_excav.evaluation.experiment.stage_record import attempt, log_path, new_record, read_record
+
+PATIENCE_S = 20.0
+"""How long a stopped command may take to end before it is killed [s]; a guess."""
+
+
+class StageRun:
+    """A stage's command at work, its output in the stage's log.
+
+    Args:
+        stage: What to run; nothing may lie at its result.
+        environment: Variables for the command, beside those of this process.
+        log: File that takes the output of a stage without result.
+
+    Raises:
+        ConfigurationError: Another process is at it.
+    """
+
+    def __init__(self, stage: Stage, environment: Mapping[str, str], log: Path) -> None:
+        self.stage = stage
+        self.log = log if stage.makes is None else log_path(stage.makes)
+        self._resumed = stage.resumes
+        self._command = stage.next_command
+        self._environment = environment
+        self.log.parent.mkdir(parents=True, exist_ok=True)
+        with self.log.open("a") as output:
+            _lock(output, stage.name)
+            if not self._resumed and stage.workspace not in (None, stage.makes):
+                shutil.rmtree(str(stage.workspace), ignore_errors=True)
+            self._started, self._clock = datetime.now(UTC), time.monotonic()
+            output.write(f"\n# {self._started:%Y-%m-%d %H:%M:%S} UTC\n{self._command}\n\n")
+            output.flush()
+            self._said_from = output.tell()
+            self._process = _start(self._command, environment, output)
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code of the command; None while it runs."""
+        return self._process.poll()
+
+    @property
+    def wall_s(self) -> float:
+        """Time since the start [s]."""
+        return time.monotonic() - self._clock
+
+    def output(self) -> str:
+        """Return what the command has said."""
+        with self.log.open() as file:
+            file.seek(self._said_from)
+            return file.read()
+
+    def stop(self) -> None:
+        """End the command, with all processes it has started, and wait for it."""
+        if self._process.poll() is None:
+            _signal(self._process, signal.SIGTERM)
+            try:
+                self._process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                _signal(self._process, signal.SIGKILL)
+                self._process.wait()
+
+    def finish(self) -> bool:
+        """Write the record of an ended command and put its result in place; return whether it succeeded."""
+        exit_code = self._process.wait()
+        succeeded = exit_code == 0
+        makes, workspace = self.stage.makes, self.stage.workspace
+        if makes is None or workspace is None:
+            return succeeded
+        record = read_record(makes) if self._resumed or self.stage.appears_whole else None
+        record = record or new_record(self.stage.name, self._command, self._environment)
+        run = attempt(self._started, wall_s=self.wall_s, exit_code=exit_code)
+        replace(record, attempts=[*record.attempts, run]).write(makes)
+        if not succeeded or not workspace.exists():
+            return False
+        if workspace != makes:
+            workspace.rename(makes)
+        return True
+
+
+def _lock(log: IO[str], name: str) -> None:
+    """Hold the log alone; the command inherits the lock, so that it holds until both have ended."""
+    try:
+        fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ConfigurationError(
+            f"another process is at stage {name}, by the lock on {log.name}; wait for it, or end it"
+        ) from None
+
+
+def _start(command: str, environment: Mapping[str, str], output: IO[str]) -> "subprocess.Popen[bytes]":
+    # The commands are installed beside this Python, whether its environment is activated or not.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    return subprocess.Popen(
+        ["bash", "-euo", "pipefail", "-c", command],
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, "PATH": path, **environment},
+        start_new_session=True,
+    )
+
+
+def _signal(process: "subprocess.Popen[bytes]", number: int) -> None:
+    """Signal a command and what it has started: they form a session of their own."""
+    os.killpg(process.pid, number)

@@ -1,0 +1,109 @@
+from pathlib import Path
+
+import pytest
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.experiment.experiment import read_experiment
+
+
+def test_words_stand_in_braces_and_may_hold_further_ones(experiment):
+    text = """
+    steps = 3
+    training = "--steps={steps} --log_freq=1"
+    [[stage]]
+    name = "train"
+    command = "lerobot-train {training} --policy.shape={2}"
+    """
+    with pytest.raises(ConfigurationError, match=r"train: \{2\} is not known; allowed: .*steps"):
+        experiment(text)
+    (stage,) = experiment(text.replace("{2}", "[2]")).stages
+    assert stage.command == "lerobot-train --steps=3 --log_freq=1 --policy.shape=[2]"
+
+
+def test_a_setting_given_by_the_user_wins(experiment):
+    text = 'steps = 3\n[[stage]]\nname = "a"\ncommand = "echo {steps}"'
+    assert experiment(text, steps="7").stages[0].command == "echo 7"
+    with pytest.raises(ConfigurationError, match=r"--set='stepz' is not known; allowed: .*'steps'"):
+        experiment(text, stepz="7")
+
+
+def test_each_makes_a_stage_per_table(experiment):
+    stages = experiment("""
+    [[stage]]
+    name = "data-{kind}"
+    each = [{kind = "a", count = 1}, {kind = "b", count = 2}]
+    makes = "{tmp}/{kind}"
+    command = "make {count} > {makes}"
+    [[stage]]
+    name = "table"
+    needs = ["data-*"]
+    command = "cat"
+    """).stages
+    assert [stage.name for stage in stages] == ["data-a", "data-b", "table"]
+    assert stages[1].command == f"make 2 > {stages[1].makes}.partial"
+    assert stages[2].needs == ("data-a", "data-b")
+
+
+def test_a_result_that_appears_whole_is_made_in_place(experiment):
+    (stage,) = experiment("""
+    [[stage]]
+    name = "data"
+    makes = "{tmp}/data"
+    appears_whole = true
+    command = "demos --out={makes}"
+    """).stages
+    assert stage.shell_lines() == [f"demos --out={stage.makes}"]
+
+
+def test_the_shell_lines_make_the_result_beside_and_move_it(experiment):
+    (stage,) = experiment("""
+    [[stage]]
+    name = "data"
+    makes = "{tmp}/data"
+    command = "mkdir {makes}"
+    """).stages
+    partial = f"{stage.makes}.partial"
+    assert stage.shell_lines() == [f"rm -rf {partial}", f"mkdir {partial}", f"mv {partial} {stage.makes}"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[[stage]]\nname = "a"', "lacks 'command'"),
+        ('[[stage]]\nname = "a"\ncommand = "c"\nmake = "x"', "key of a stage='make' is not known"),
+        ('[[stages]]\nname = "a"', "table='stages' is not known"),
+        ('[[stage]]\nname = "a"\ncommand = "c"\nneeds = ["b"]', "a needs 'b', which is no earlier stage"),
+        ('[[stage]]\nname = "a"\ncommand = "c"\nneeds = ["a"]', "a needs 'a', which is no earlier stage"),
+        (
+            '[[stage]]\nname = "a"\ncommand = "c"\n[[stage]]\nname = "a"\ncommand = "c"',
+            "two stages are called 'a'",
+        ),
+        ('[[stage]]\nname = "a"\ncommand = "c"\nresume = "r"', "resume and resume_from go together"),
+        ('a = "{b}"\nb = "{a}"\n[[stage]]\nname = "s"\ncommand = "{a}"', "name each other without end"),
+        ("[[stage", "is no TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_used_says_why(experiment, text, message):
+    with pytest.raises(ConfigurationError, match=message):
+        experiment(text)
+
+
+def test_a_missing_file_is_named():
+    with pytest.raises(ConfigurationError, match=r"nowhere\.toml does not exist"):
+        read_experiment(Path("nowhere.toml"))
+
+
+def test_stages_are_chosen_by_pattern(experiment):
+    chosen = experiment("""
+    [[stage]]
+    name = "test-{n}"
+    each = [{n = 1}, {n = 2}]
+    command = "c"
+    [[stage]]
+    name = "report"
+    command = "c"
+    """)
+    assert [stage.name for stage in chosen.select(["test-*"])] == ["test-1", "test-2"]
+    assert len(chosen.select([])) == 3
+    with pytest.raises(ConfigurationError, match="--only='tset' matches no stage"):
+        chosen.select(["tset"])

@@ -1,0 +1,178 @@
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.experiment.runner import run_experiment, state
+from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
+
+# A command that leaves a trace of every run, then makes its folder.
+COUNTED = """
+[[stage]]
+name = "{name}"
+makes = "{{tmp}}/{name}"
+command = "echo run >> {{tmp}}/{name}.runs && {command}"
+"""
+
+
+def counted(name="data", command="mkdir {makes}"):
+    return COUNTED.format(name=name, command=command)
+
+
+def runs(tmp_path, name="data"):
+    path = tmp_path / f"{name}.runs"
+    return len(path.read_text().split()) if path.exists() else 0
+
+
+def run(experiment, *only, jobs=1):
+    said = []
+    succeeded = run_experiment(experiment, experiment.select(only), jobs=jobs, say=said.append)
+    return succeeded, "\n".join(said)
+
+
+def test_a_finished_stage_is_not_run_again(experiment, tmp_path):
+    for _ in range(2):
+        assert run(experiment(counted()))[0]
+    assert runs(tmp_path) == 1
+    assert (tmp_path / "data").is_dir()
+
+
+def test_what_was_made_by_hand_is_finished(experiment, tmp_path):
+    (tmp_path / "data").mkdir()
+    succeeded, said = run(experiment(counted()))
+    assert succeeded
+    assert runs(tmp_path) == 0
+    assert "data is finished" in said
+
+
+def test_a_failed_stage_leaves_no_result_and_is_run_again_from_nothing(experiment, tmp_path):
+    command = "mkdir {makes} && touch {makes}/half && test -e {tmp}/repaired"
+    broken = experiment(counted(command=command))
+    succeeded, said = run(broken)
+    assert not succeeded
+    assert "data: FAILED with exit code 1" in said
+    assert not (tmp_path / "data").exists()
+    assert state(broken.stages[0]) == "interrupted"
+    (tmp_path / "repaired").touch()
+    assert run(broken)[0]  # mkdir would fail, were the half result still there
+    assert runs(tmp_path) == 2
+    assert [attempt["exit_code"] for attempt in read_record(tmp_path / "data").attempts] == [0]
+
+
+def test_a_command_that_makes_nothing_has_failed(experiment):
+    assert not run(experiment(counted(command="true")))[0]
+
+
+def test_after_a_failure_nothing_further_is_started(experiment, tmp_path):
+    assert not run(experiment(counted("bad", "false") + counted("next")))[0]
+    assert runs(tmp_path, "next") == 0
+
+
+RESUMED = """
+[[stage]]
+name = "train"
+makes = "{tmp}/train"
+command = "mkdir {makes} && touch {makes}/checkpoint && false"
+resume_from = "{makes}/checkpoint"
+resume = "test -f {resume_from} && touch {makes}/resumed"
+"""
+
+
+def test_an_interrupted_training_goes_on_from_its_checkpoint(experiment, tmp_path):
+    training = experiment(RESUMED)
+    assert not run(training)[0]
+    assert training.stages[0].resumes
+    succeeded, said = run(training)
+    assert succeeded
+    assert "train (continued)" in said
+    assert sorted(path.name for path in (tmp_path / "train").iterdir()) == ["checkpoint", "resumed"]
+    record = read_record(tmp_path / "train")
+    assert record.command == training.stages[0].command
+    assert [attempt["exit_code"] for attempt in record.attempts] == [1, 0]
+    assert record.wall_s == pytest.approx(sum(attempt["wall_s"] for attempt in record.attempts))
+
+
+def test_a_stage_waits_for_those_it_needs(experiment, tmp_path):
+    text = counted("slow", "sleep 0.5 && mkdir {makes}")
+    text += counted("after", "test -d {tmp}/slow && mkdir {makes}") + 'needs = ["slow"]\n'
+    assert run(experiment(text), jobs=2)[0]
+
+
+def test_a_needed_stage_must_be_finished_or_chosen(experiment):
+    chain = experiment(counted("a") + counted("b") + 'needs = ["a"]\n')
+    with pytest.raises(
+        ConfigurationError, match="stage b needs a, which is not finished; add it: --only a b"
+    ):
+        run(chain, "b")
+    assert run(chain, "a")[0]
+    assert run(chain, "b")[0]
+
+
+def test_jobs_run_side_by_side(experiment):
+    # Each waits for the other's trace, so alone neither would end.
+    def meet(other):
+        return f"until test -e {{tmp}}/{other}.runs; do sleep 0.05; done; mkdir {{makes}}"
+
+    assert run(experiment(counted("a", meet("b")) + counted("b", meet("a"))), jobs=2)[0]
+
+
+def test_the_record_tells_command_environment_code_and_time(experiment, tmp_path):
+    text = '[environment]\nCOLOUR = "red"\n' + counted(command="mkdir {makes} && echo $COLOUR")
+    assert run(experiment(text))[0]
+    record = read_record(tmp_path / "data")
+    assert record.command == experiment(text).stages[0].command
+    assert record.environment == {"COLOUR": "red"}
+    assert record.commit is None or len(record.commit) == 40
+    assert {"lerobot", "lerobot_env_excav", "torch", "mujoco"} <= set(record.packages)
+    assert record.wall_s >= 0.0
+    assert log_path(tmp_path / "data").read_text().endswith("red\n")
+
+
+def test_a_result_of_another_command_is_kept_and_said(experiment, tmp_path):
+    run(experiment(counted()))
+    changed = experiment(counted(command="mkdir -p {makes}"))
+    assert state(changed.stages[0]) == "changed"
+    assert "by another command than the file has now" in run(changed)[1]
+    assert runs(tmp_path) == 1
+
+
+def test_a_stage_without_result_runs_every_time_and_shows_its_output(experiment, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = experiment('[[stage]]\nname = "report"\ncommand = "echo a table"')
+    for _ in range(2):
+        succeeded, said = run(table)
+        assert succeeded
+        assert said.count("a table") == 2  # the command and what it printed
+    assert state(table.stages[0]) == "always"
+
+
+def test_an_interruption_ends_the_command_and_leaves_no_result(experiment, tmp_path):
+    running = experiment(counted(command="mkdir {makes} && echo $$ > {tmp}/pid && sleep 60"))
+
+    def interrupt():
+        while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        run(running)
+    assert state(running.stages[0]) == "interrupted"
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+def test_two_runners_do_not_work_on_one_stage(experiment, tmp_path):
+    busy = experiment(counted(command="touch {tmp}/started && sleep 1 && mkdir {makes}"))
+    other = threading.Thread(target=run, args=(busy,))
+    other.start()
+    while not (tmp_path / "started").exists():
+        time.sleep(0.05)
+    with pytest.raises(ConfigurationError, match="another process is at stage data"):
+        run(busy)
+    other.join()
+    assert runs(tmp_path) == 1
+    assert (tmp_path / "data").exists()
