@@ -67,7 +67,7 @@ class MaskACTNetwork(nn.Module):
     | state (`observation.state`) | 0 or 1 | learned |
     | environment state | 0 or 1 | learned |
     | cells of each camera's feature map, row by row | h w per camera | 2-D sines and cosines |
-    | target | 0 or 1 | mean of the 2-D encodings under the mask |
+    | target | 0 or 1 | mean of the 2-D sines and cosines over the pixels of the mask |
 
     The transformer layers are LeRobot's own. Differences from its ACT: four input channels; all views of one size
     pass the backbone as one batch, so batch statistics are taken over all cameras; several actions per decoder query.
@@ -161,7 +161,7 @@ class MaskACTNetwork(nn.Module):
         pos_embeds += [grid.flatten(2).permute(2, 0, 1) for grid in grids]
 
         if self.target_token is not None:
-            token, position = self.target_token(maps[self.main_index], grids[self.main_index], mask)
+            token, position = self.target_token(maps[self.main_index], mask)
             tokens.append(token.unsqueeze(0))
             pos_embeds = [pos_embed.expand(-1, mask.shape[0], -1) for pos_embed in pos_embeds]
             pos_embeds.append(position.unsqueeze(0))

@@ -1,61 +1,131 @@
 import pytest
 import torch
+from lerobot.policies.act.modeling_act import ACTSinusoidalPositionEmbedding2d
 
-from lerobot_excav.policies.mask_act.target_token import TargetToken
+from lerobot_excav.policies.mask_act.target_token import TargetToken, axis_encodings
+
+DIM, CELLS, STRIDE = 16, (3, 4), 16
+SIZE = (CELLS[0] * STRIDE, CELLS[1] * STRIDE)
 
 
 @pytest.fixture
 def token():
     torch.manual_seed(0)
-    return TargetToken(8)
+    return TargetToken(DIM)
 
 
-def maps(seed=0):
-    generator = torch.Generator().manual_seed(seed)
-    return torch.randn(1, 8, 2, 3, generator=generator), torch.randn(1, 8, 2, 3, generator=generator)
+def features(seed=0, batch_size=1):
+    return torch.randn(batch_size, DIM, *CELLS, generator=torch.Generator().manual_seed(seed))
 
 
-def test_a_mask_over_one_cell_takes_that_cell_alone(token):
-    features, grid = maps()
-    mask = torch.zeros(1, 1, 32, 48)
-    mask[..., 16:32, 0:16] = 1
-    content, position = token(features, grid, mask)
-    expected = features[0, :, 1, 0] + token.position_proj(grid[0, :, 1, 0]) + token.kind_embed
+def blob(top, left, height=6, width=6):
+    mask = torch.zeros(1, 1, *SIZE)
+    mask[..., top : top + height, left : left + width] = 1
+    return mask
+
+
+def pixel_by_pixel(mask):
+    """The mean of LeRobot's formula over the pixels of a mask, one pixel at a time."""
+    frequency = 10000 ** (-2 * (torch.arange(DIM // 2) // 2) / (DIM // 2))
+    encodings = []
+    for row, column in mask[0, 0].nonzero().tolist():
+        halves = []
+        for pixel, cells, pixels in ((row, CELLS[0], SIZE[0]), (column, CELLS[1], SIZE[1])):
+            cell = (pixel + 0.5) * cells / pixels + 0.5  # the first cell's centre is 1
+            angle = 2 * torch.pi * cell / cells * frequency
+            halves.append(torch.where(torch.arange(DIM // 2) % 2 == 0, angle.sin(), angle.cos()))
+        encodings.append(torch.cat(halves))
+    return torch.stack(encodings).mean(dim=0)
+
+
+def test_the_encoding_of_a_cell_centre_is_the_encoding_that_lerobot_gives_the_cell():
+    grid = ACTSinusoidalPositionEmbedding2d(DIM // 2)(features())[0]  # (D, h, w)
+    rows, columns = axis_encodings(CELLS[0], CELLS[0], DIM // 2), axis_encodings(CELLS[1], CELLS[1], DIM // 2)
+    torch.testing.assert_close(rows, grid[: DIM // 2, :, 0].T, atol=1e-5, rtol=0)
+    torch.testing.assert_close(columns, grid[DIM // 2 :, 0, :].T, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("top", "left", "height", "width"), [(0, 0, 6, 6), (7, 9, 3, 20), (40, 60, 8, 4), (0, 0, 48, 64)]
+)
+def test_the_position_is_the_mean_over_the_masks_pixels(token, top, left, height, width):
+    mask = blob(top, left, height, width)
+    _, position = token(features(), mask)
+    torch.testing.assert_close(position[0], pixel_by_pixel(mask), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("shift", [(1, 0), (0, 1), (-1, -1)])
+def test_a_shift_by_one_pixel_within_a_cell_moves_the_token(token, shift):
+    here, there = blob(21, 37), blob(21 + shift[0], 37 + shift[1])  # both within cell (1, 2)
+    content, position = token(features(), here)
+    content_there, position_there = token(features(), there)
+    expected = pixel_by_pixel(there) - pixel_by_pixel(here)
+    assert expected.abs().max() > 0.02
+    torch.testing.assert_close((position_there - position)[0], expected, atol=1e-5, rtol=0)
+    torch.testing.assert_close(
+        content_there - content, token.position_proj(position_there) - token.position_proj(position)
+    )
+
+
+def test_pictures_that_the_cells_do_not_tile_are_encoded_from_edge_to_edge(token):
+    mask = torch.ones(1, 1, 41, 57)
+    _, position = token(features(), mask)
+    _, tiled = token(features(), torch.ones(1, 1, *SIZE))
+    torch.testing.assert_close(position, tiled, atol=1e-3, rtol=0)
+
+
+def test_a_mask_over_one_cell_takes_the_features_of_that_cell_alone(token):
+    maps = features()
+    content, position = token(maps, blob(16, 0, 16, 16))
+    expected = maps[0, :, 1, 0] + token.position_proj(position[0]) + token.kind_embed
     torch.testing.assert_close(content[0], expected)
-    torch.testing.assert_close(position[0], grid[0, :, 1, 0])
 
 
-def test_cells_weigh_as_much_as_the_mask_covers_them(token):
-    features, grid = maps()
-    mask = torch.zeros(1, 1, 32, 48)
-    mask[..., 0:16, 12:32] = 1  # a quarter of cell 0, all of cell 1
-    _, position = token(features, grid, mask)
-    torch.testing.assert_close(position[0], (grid[0, :, 0, 0] + 4 * grid[0, :, 0, 1]) / 5)
+def test_the_features_of_cells_weigh_as_much_as_the_mask_covers_them(token):
+    maps = features()
+    content, position = token(maps, blob(0, 12, 16, 20))  # a quarter of cell 0, all of cell 1
+    pooled = content[0] - token.position_proj(position[0]) - token.kind_embed
+    torch.testing.assert_close(pooled, (maps[0, :, 0, 0] + 4 * maps[0, :, 0, 1]) / 5)
+
+
+def test_two_blobs_pool_to_their_mean_by_area(token):
+    one, other = blob(2, 3, 4, 4), blob(30, 50, 4, 8)
+    (content_1, position_1), (content_2, position_2) = token(features(), one), token(features(), other)
+    content, position = token(features(), one + other)
+    torch.testing.assert_close(position, (position_1 + 2 * position_2) / 3)
+    torch.testing.assert_close(content, (content_1 + 2 * content_2) / 3)
+
+
+def test_stray_pixels_move_the_token_by_no_more_than_their_share(token):
+    clean = blob(20, 20)
+    noisy = clean.clone()
+    noisy[..., 40, 60] = 1
+    _, position = token(features(), clean)
+    _, disturbed = token(features(), noisy)
+    assert 0 < (disturbed - position).abs().max() <= 2 / 37
+
+
+def test_a_single_pixel_is_a_target(token):
+    mask = blob(47, 63, 1, 1)
+    content, position = token(features(), mask)
+    torch.testing.assert_close(position[0], pixel_by_pixel(mask), atol=1e-5, rtol=0)
+    assert not torch.equal(content[0], token.no_target_embed)
 
 
 def test_an_empty_mask_gives_the_learned_token_whatever_the_picture(token):
-    empty = torch.zeros(1, 1, 32, 48)
+    empty = torch.zeros(1, 1, *SIZE)
     for seed in range(3):
-        content, position = token(*maps(seed), empty)
+        content, position = token(features(seed), empty)
         assert torch.equal(content[0], token.no_target_embed)
         assert not position.any()
 
 
 def test_an_empty_mask_beside_a_full_one_leaves_finite_gradients(token):
-    features, grid = maps()
-    features = features.repeat(2, 1, 1, 1).requires_grad_()
-    mask = torch.zeros(2, 1, 32, 48)
+    maps = features(batch_size=2).requires_grad_()
+    mask = torch.zeros(2, 1, *SIZE)
     mask[1] = 1
-    content, _ = token(features, grid, mask)
+    content, _ = token(maps, mask)
     content.square().sum().backward()
-    assert torch.isfinite(features.grad).all()
-    assert not features.grad[0].any()
-    assert features.grad[1].any()
-
-
-def test_a_single_pixel_is_a_target(token):
-    mask = torch.zeros(1, 1, 32, 48)
-    mask[..., 31, 47] = 1
-    features, grid = maps()
-    _, position = token(features, grid, mask)
-    torch.testing.assert_close(position[0], grid[0, :, 1, 2])
+    assert torch.isfinite(maps.grad).all()
+    assert not maps.grad[0].any()
+    assert maps.grad[1].any()
