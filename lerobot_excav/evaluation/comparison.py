@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.errors import DatasetError, require
-from lerobot_excav.evaluation.metrics import EpisodeKey, Run
+from lerobot_excav.evaluation.episode import EpisodeKey
+from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, paired_bootstrap
-
-MEASURES = ("target_success", "is_success", "retained_mass_kg")
-RATES = ("target_success", "is_success")
+from lerobot_excav.evaluation.task_table import Column, Kind
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +18,7 @@ class Difference:
     """Difference of one measure between two runs.
 
     Attributes:
-        measure: Field of `EpisodeMetrics`.
+        measure: Field of the task's `Episode`.
         difference: Second minus first, over scenes and targets.
         p_value: McNemar's exact test; None for measures that are no rates, or with several seeds, whose episodes on
             one scene are not independent.
@@ -39,10 +38,10 @@ def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Differenc
         rng: Source of the bootstrap.
 
     Raises:
-        DatasetError: The runs show different scenes or targets, or dug different soils.
+        DatasetError: The runs are of different tasks, show different scenes or targets, or played different worlds.
     """
     require_same_keys(first, second)
-    return [_difference(measure, first, second, rng) for measure in MEASURES]
+    return [_difference(first.table.column(key), first, second, rng) for key in first.table.compared]
 
 
 def require_same_keys(first: Run, second: Run) -> None:
@@ -57,18 +56,24 @@ def require_same_keys(first: Run, second: Run) -> None:
         )
 
 
+def require_same_task(first: Run, second: Run) -> None:
+    """Raise `DatasetError` unless two runs are of one task."""
+    if first.table is not second.table:
+        raise DatasetError(
+            f"{first.label} is of {first.table.task} and {second.label} of {second.table.task}; report them apart"
+        )
+
+
 def difference_of_worlds(first: Run, second: Run) -> str:
     """Say why the scenes of two runs differ although their numbers are the same; an empty string if they do not."""
-    if (first.soil, first.simulation_version) == (second.soil, second.simulation_version):
+    if first.world == second.world:
         return ""
-    played = " and ".join(
-        f"{run.label} dug {run.soil} in version {run.simulation_version} of the simulation"
-        for run in (first, second)
-    )
+    played = " and ".join(f"{run.label} {run.world}" for run in (first, second))
     return f"{played}, where a number means another scene"
 
 
 def _require_same_world(first: Run, second: Run) -> None:
+    require_same_task(first, second)
     difference = difference_of_worlds(first, second)
     if difference:
         raise DatasetError(f"{difference}; play both alike, or report them apart")
@@ -83,19 +88,19 @@ def _mean(run: Run, key: EpisodeKey, measure: str) -> float:
     return float(np.mean([getattr(evaluation.episodes[key], measure) for evaluation in run.evaluations]))
 
 
-def _difference(measure: str, first: Run, second: Run, rng: np.random.Generator) -> Difference:
-    values = means_by_key(first, measure), means_by_key(second, measure)
-    testable = measure in RATES and len(first.evaluations) == len(second.evaluations) == 1
+def _difference(column: Column, first: Run, second: Run, rng: np.random.Generator) -> Difference:
+    values = means_by_key(first, column.field), means_by_key(second, column.field)
+    testable = column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1
     p_value = None
     if testable:
         only_first = int(np.sum((values[0] == 1) & (values[1] == 0)))
         only_second = int(np.sum((values[0] == 0) & (values[1] == 1)))
         p_value = mcnemar_exact(only_first, only_second)
-    return Difference(measure=measure, difference=paired_bootstrap(*values, rng), p_value=p_value)
+    return Difference(measure=column.field, difference=paired_bootstrap(*values, rng), p_value=p_value)
 
 
-def matched(run: Run, reference: Run) -> NDArray[Any]:
-    """Return the reference's retained mass on the scenes and targets of a run [kg], in the order of `run.keys`.
+def matched(run: Run, reference: Run, measure: str) -> NDArray[Any]:
+    """Return the reference's measure on the scenes and targets of a run, in the order of `run.keys`.
 
     Raises:
         DatasetError: The reference lacks one of them.
@@ -109,4 +114,4 @@ def matched(run: Run, reference: Run) -> NDArray[Any]:
             "make it longer with `lerobot-excav bench operator --scenes=…`"
         )
     require(len(reference.evaluations) == 1, "the operator's run must be a single evaluation")
-    return np.array([_mean(reference, key, "retained_mass_kg") for key in run.keys])
+    return np.array([_mean(reference, key, measure) for key in run.keys])

@@ -3,64 +3,20 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, get_args
 
 from lerobot_excav.datasets.json_lines import Line, read_json_lines
-from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
-from lerobot_excav.errors import DatasetError, require
+from lerobot_excav.errors import DatasetError
+from lerobot_excav.evaluation.episode import Episode, EpisodeKey
+from lerobot_excav.evaluation.grasp_table import GRASP
+from lerobot_excav.evaluation.scoop_table import SCOOP
+from lerobot_excav.evaluation.task_table import TaskTable
 
-TASK = "Scoop-v0"
+TASK_TABLES = {table.task: table for table in (SCOOP, GRASP)}
+"""Every task that reports are made of."""
 
-
-class EpisodeKey(NamedTuple):
-    """What makes episodes of two runs comparable."""
-
-    scene_set: str
-    scene_id: int
-    target_id: int
-
-    def __str__(self) -> str:
-        return f"{self.scene_set}/{self.scene_id}/{self.target_id}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class EpisodeMetrics:
-    """Outcome of one episode; see `docs/datasets.md` for the definitions.
-
-    Attributes:
-        simulation_version: Version of the simulation.
-        scene_set: Scene set.
-        scene_id: Scene.
-        target_id: Target.
-        mask_condition: Which mask was shown.
-        soil: Soil preset.
-        fidelity: Numerical effort of the soil.
-        target_success: Whether loading began inside the commanded patch.
-        is_success: Whether every part of the task succeeded.
-        retained_mass_kg: Soil brought into the box [kg].
-        residual_bucket_mass_kg: Soil left in the bucket [kg].
-        hard_target_contacts: Hard contacts with the box.
-        spill_before_target_events: Losses of soil on the way.
-    """
-
-    simulation_version: int
-    scene_set: str
-    scene_id: int
-    target_id: int
-    mask_condition: str
-    soil: str
-    fidelity: str
-    target_success: bool
-    is_success: bool
-    retained_mass_kg: float
-    residual_bucket_mass_kg: float
-    hard_target_contacts: int
-    spill_before_target_events: int
-
-    @property
-    def key(self) -> EpisodeKey:
-        """Scene and target."""
-        return EpisodeKey(self.scene_set, self.scene_id, self.target_id)
+UNMARKED_TASK = SCOOP.task
+"""The task of the files that were written when there was one only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,15 +25,19 @@ class Evaluation:
 
     Attributes:
         path: The file.
+        table: What reports know of its task.
         of: How many evaluations the file holds; LeRobot appends one after the other, and this is the last.
-        operator: Who dug, if the file says so: `scripted`, `human`, or None for a policy.
+        operator: Who played, if the file says so: `scripted`, `human`, or None for a policy.
+        seed: Seed of the first episode; LeRobot's `--seed`. None if the file does not say.
         episodes: Outcomes by scene and target.
     """
 
     path: Path
+    table: TaskTable
     of: int
     operator: str | None
-    episodes: dict[EpisodeKey, EpisodeMetrics]
+    seed: int | None
+    episodes: dict[EpisodeKey, Episode]
 
 
 def read_evaluation(path: Path) -> Evaluation:
@@ -87,8 +47,8 @@ def read_evaluation(path: Path) -> Evaluation:
         path: The file, or a folder with `metrics.jsonl` in it.
 
     Raises:
-        DatasetError: The file is missing, empty or damaged, a field is missing or of another type, or an episode
-            occurs twice.
+        DatasetError: The file is missing, empty or damaged, a field is missing or of another type, a task is unknown
+            or tasks are mixed, or an episode occurs twice.
     """
     path = path / "metrics.jsonl" if path.is_dir() else path
     lines = read_json_lines(path, origin=f"lerobot-eval writes it with --env.metrics_path={path}")
@@ -96,11 +56,14 @@ def read_evaluation(path: Path) -> Evaluation:
         raise DatasetError(f"{path} is empty: no episode was finished")
     evaluations = _evaluations(lines)
     last = evaluations[-1]
+    table = _table(last)
     return Evaluation(
         path=path,
+        table=table,
         of=len(evaluations),
         operator=last[0].record.get("operator"),
-        episodes=_by_key(last),
+        seed=last[0].record.get("seed"),
+        episodes=_by_key(last, table),
     )
 
 
@@ -110,10 +73,23 @@ def _evaluations(lines: list[Line]) -> list[list[Line]]:
     return [lines[a:b] for a, b in zip(starts, [*starts[1:], len(lines)], strict=True)]
 
 
-def _by_key(lines: Iterable[Line]) -> dict[EpisodeKey, EpisodeMetrics]:
-    episodes: dict[EpisodeKey, EpisodeMetrics] = {}
+def _table(lines: list[Line]) -> TaskTable:
+    first = lines[0].record.get("task", UNMARKED_TASK)
     for line in lines:
-        episode = _episode(line)
+        task = line.record.get("task", UNMARKED_TASK)
+        if task not in TASK_TABLES:
+            raise DatasetError(
+                f"{line.place}: task={task!r}; reports are made of {', '.join(TASK_TABLES)} only"
+            )
+        if task != first:
+            raise DatasetError(f"{line.place}: task={task!r}, but the lines before are of {first!r}")
+    return TASK_TABLES[first]
+
+
+def _by_key(lines: Iterable[Line], table: TaskTable) -> dict[EpisodeKey, Episode]:
+    episodes: dict[EpisodeKey, Episode] = {}
+    for line in lines:
+        episode = _episode(line, table)
         if episode.key in episodes:
             raise DatasetError(
                 f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?"
@@ -122,23 +98,22 @@ def _by_key(lines: Iterable[Line]) -> dict[EpisodeKey, EpisodeMetrics]:
     return episodes
 
 
-def _episode(line: Line) -> EpisodeMetrics:
-    # The first version wrote neither its number nor the fidelity, of which it had one only.
-    record = {"simulation_version": UNMARKED_VERSION, **line.record}
-    if record["simulation_version"] == UNMARKED_VERSION:
-        record.setdefault("fidelity", "standard")
-    if record.get("task", TASK) != TASK:
-        raise DatasetError(f"{line.place}: task={record['task']!r}; reports are made of {TASK} only")
+def _episode(line: Line, table: TaskTable) -> Episode:
+    record = table.episode.completed(line.record)
     values: dict[str, Any] = {}
-    for field in fields(EpisodeMetrics):
+    for field in fields(table.episode):
         if field.name not in record:
             raise DatasetError(f"{line.place}: lacks {field.name}; was it written by --env.metrics_path?")
         values[field.name] = _typed(record[field.name], field.type, f"{line.place}: {field.name}")
-    return EpisodeMetrics(**values)
+    return table.episode(**values)
 
 
 def _typed(value: Any, kind: Any, place: str) -> Any:
     """Check a JSON value against a type; whole numbers are numbers, but truth values are not."""
+    if kinds := get_args(kind):  # `int | None`
+        kind = kinds[0]
+        if value is None:
+            return None
     fits = {
         bool: isinstance(value, bool),
         str: isinstance(value, str),
@@ -148,51 +123,3 @@ def _typed(value: Any, kind: Any, place: str) -> Any:
     if not fits:
         raise DatasetError(f"{place}={value!r} is no {kind.__name__}")
     return kind(value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """A policy, or an operator, evaluated once or with several training seeds on the same scenes.
-
-    Attributes:
-        label: Name in the report.
-        evaluations: One per training seed.
-    """
-
-    label: str
-    evaluations: tuple[Evaluation, ...]
-
-    def __post_init__(self) -> None:
-        first = set(self.evaluations[0].episodes)
-        for evaluation in self.evaluations[1:]:
-            require(
-                set(evaluation.episodes) == first,
-                f"{self.label}: {evaluation.path} shows other scenes or targets than {self.evaluations[0].path}; "
-                "evaluate every seed with the same --seed and --eval.n_episodes",
-            )
-        conditions = {(e.mask_condition, e.soil, e.fidelity, e.simulation_version) for e in self.episodes}
-        require(
-            len(conditions) == 1,
-            f"{self.label} mixes mask conditions, soils, fidelities or versions of the simulation: "
-            f"{sorted(conditions)}; give each a file of its own",
-        )
-
-    @property
-    def simulation_version(self) -> int:
-        """Version of the simulation, the same for all episodes."""
-        return self.episodes[0].simulation_version
-
-    @property
-    def soil(self) -> str:
-        """Soil preset, the same for all episodes."""
-        return self.episodes[0].soil
-
-    @property
-    def keys(self) -> list[EpisodeKey]:
-        """Scenes and targets, sorted."""
-        return sorted(self.evaluations[0].episodes)
-
-    @property
-    def episodes(self) -> list[EpisodeMetrics]:
-        """All episodes, evaluation by evaluation, each in the order of `keys`."""
-        return [evaluation.episodes[key] for evaluation in self.evaluations for key in self.keys]

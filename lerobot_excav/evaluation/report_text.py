@@ -2,41 +2,21 @@
 
 from collections.abc import Sequence
 
-from lerobot_excav.evaluation.comparison import RATES, Difference
-from lerobot_excav.evaluation.report import Report, RunSummary
+from lerobot_excav.evaluation.comparison import Difference
+from lerobot_excav.evaluation.report import Report
+from lerobot_excav.evaluation.run_summary import RateOf, RunSummary, Value
 from lerobot_excav.evaluation.statistics import Interval
-
-HEADER = (
-    "run",
-    "soil",
-    "mask",
-    "n",
-    "seeds",
-    "target success [%]",
-    "full success [%]",
-    "retained [kg]",
-    "efficiency [%]",
-    "residual [kg]",
-    "hard contact [%]",
-    "spill [%]",
-)
-MEASURE_NAMES = {
-    "target_success": "target success [%]",
-    "is_success": "full success [%]",
-    "retained_mass_kg": "retained [kg]",
-}
+from lerobot_excav.evaluation.task_table import Column, TaskTable
 
 
 def report_text(report: Report) -> str:
     """Write a report as Markdown."""
-    parts = ["# Evaluation", "", *_table(HEADER, [_row(run) for run in report.runs]), ""]
+    table = report.runs[0].table
+    header = ["run", *table.setting, "n", "seeds", *(column.header for column in table.columns)]
+    parts = ["# Evaluation", "", *markdown_table(header, [_row(run) for run in report.runs]), ""]
     for name, differences in report.differences.items():
-        parts += [
-            f"## {name}",
-            "",
-            *_table(("measure", "difference", "p"), [_change(d) for d in differences]),
-            "",
-        ]
+        rows = [_change(table, difference) for difference in differences]
+        parts += [f"## {name}", "", *markdown_table(("measure", "difference", "p"), rows), ""]
     return "\n".join([*parts, *(f"- {line}" for line in _legend(report)), ""])
 
 
@@ -45,15 +25,9 @@ def _legend(report: Report) -> list[str]:
         "Brackets: 95 % intervals; Wilson's for rates over episodes, bootstrap for means over scenes and targets "
         f"(seed {report.bootstrap_seed}).",
         "n: episodes over all training seeds.",
-        f"Simulation: {_simulations(report)}.",
+        f"Simulation: {simulations(report.runs)}.",
+        *report.runs[0].table.legend(report.operator),
     ]
-    if report.operator is None:
-        lines.append("Efficiency needs an operator's run on the same scenes: --operator=FILE.")
-    else:
-        lines.append(
-            "Efficiency: retained mass over the operator's on the same scenes and targets; "
-            f"operator: {report.operator}."
-        )
     if report.differences:
         lines.append(
             "Differences are paired by scene and target; p from McNemar's exact test (single seeds only)."
@@ -61,38 +35,38 @@ def _legend(report: Report) -> list[str]:
     return [*lines, *report.notes]
 
 
-def _simulations(report: Report) -> str:
-    """Name version of the simulation and fidelity of the soil, run by run if they differ."""
-    by_run = {
-        run.label: f"version {run.simulation_version}, {run.fidelity} fidelity of the soil"
-        for run in report.runs
-    }
+def simulations(runs: Sequence[RunSummary]) -> str:
+    """Describe the simulation, run by run if they differ."""
+    by_run = {run.label: run.table.simulation.format(**run.constants) for run in runs}
     if len(set(by_run.values())) == 1:
         return next(iter(by_run.values()))
     return "; ".join(f"{label}: {text}" for label, text in by_run.items())
 
 
 def _row(run: RunSummary) -> list[str]:
-    return [
-        run.label,
-        run.soil,
-        run.mask_condition,
-        str(run.episodes),
-        str(run.seeds),
-        _interval(run.target_success, scale=100),
-        _interval(run.full_success, scale=100),
-        _interval(run.retained_mass_kg),
-        "-" if run.efficiency is None else _interval(run.efficiency, scale=100),
-        _interval(run.residual_bucket_mass_kg),
-        _interval(run.hard_contact, scale=100),
-        _interval(run.spill, scale=100),
-    ]
+    values = (value_text(column, run.values[column.key]) for column in run.table.columns)
+    return [run.label, *run.setting.values(), str(run.episodes), str(run.seeds), *values]
 
 
-def _change(change: Difference) -> list[str]:
-    scale = 100.0 if change.measure in RATES else 1.0
+def _change(table: TaskTable, change: Difference) -> list[str]:
+    column = next(table.column(key) for key in table.compared if table.column(key).field == change.measure)
+    return [column.header, *difference_cells(column, change)]
+
+
+def difference_cells(column: Column, change: Difference) -> list[str]:
+    """Write a difference and its p-value."""
     p_value = "-" if change.p_value is None else f"{change.p_value:.3g}"
-    return [MEASURE_NAMES[change.measure], _interval(change.difference, scale=scale, sign="+"), p_value]
+    return [_interval(change.difference, scale=column.scale, sign="+"), p_value]
+
+
+def value_text(column: Column, value: Value) -> str:
+    """Write the value of a column, with its interval and, if it is a rate of some episodes only, their number."""
+    if value is None:
+        return "-"
+    if isinstance(value, dict):
+        return " / ".join(str(value[word]) for word in column.words)
+    of = f" of {value.n}" if isinstance(value, RateOf) else ""
+    return _interval(value, scale=column.scale) + of
 
 
 def _interval(interval: Interval, *, scale: float = 1.0, sign: str = "") -> str:
@@ -100,7 +74,7 @@ def _interval(interval: Interval, *, scale: float = 1.0, sign: str = "") -> str:
     return f"{estimate:{sign}.1f} [{low:{sign}.1f}, {high:{sign}.1f}]"
 
 
-def _table(header: Sequence[str], rows: list[list[str]]) -> list[str]:
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lay out a table whose columns line up, so that it reads well unrendered."""
     widths = [max(len(cells[i]) for cells in [header, *rows]) for i in range(len(header))]
 

@@ -100,10 +100,11 @@ def _machine(arguments: argparse.Namespace) -> int:
 
 
 def _operator(arguments: argparse.Namespace) -> int:
-    from lerobot_excav.evaluation.metrics import Run, read_evaluation
+    from lerobot_excav.evaluation.metrics import read_evaluation
     from lerobot_excav.evaluation.operator_run import evaluate_operator
     from lerobot_excav.evaluation.report import make_report
     from lerobot_excav.evaluation.report_text import report_text
+    from lerobot_excav.evaluation.run import Run
 
     evaluate_operator(
         settings_from(arguments), arguments.metrics, workers=arguments.workers, resume=arguments.resume

@@ -16,9 +16,10 @@ import argparse
 from pathlib import Path
 
 from lerobot_excav.errors import require
-from lerobot_excav.evaluation.metrics import Run, read_evaluation
+from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report
 from lerobot_excav.evaluation.report_text import report_text
+from lerobot_excav.evaluation.run import Run
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from lerobot_excav.evaluation.metrics import Run, read_evaluation
+from lerobot_excav.evaluation.metrics import read_evaluation
+from lerobot_excav.evaluation.run import Run
 
 # How long an example takes says how busy the machine is, not whether the code is right.
 
@@ -32,9 +33,38 @@ def line(number, **changes):
     }
 
 
+def grasp(number, **changes):
+    return {
+        "episode_ix": number,
+        "seed": number,
+        "simulation_version": 1,
+        "task": "FR5Grasp-v0",
+        "scene_set": "test",
+        "scene_id": number,
+        "target_id": number % 4,
+        "final_target_id": number % 4,
+        "mask_condition": "correct",
+        "mask_noise": "none",
+        "mask_noise_px": 0,
+        "retarget_frame": None,
+        "is_success": True,
+        "episode_return": 800.0,
+        "first_grasped_block": number % 4,
+        "target_in_tray": True,
+        "blocks_in_tray": 1,
+        "released": True,
+        **changes,
+    }
+
+
 @pytest.fixture
 def metrics_line():
     return line
+
+
+@pytest.fixture
+def grasp_line():
+    return grasp
 
 
 @pytest.fixture

@@ -2,7 +2,8 @@ import pytest
 
 from lerobot_excav.envs.metrics_log import MetricsLog
 from lerobot_excav.errors import ConfigurationError, DatasetError
-from lerobot_excav.evaluation.metrics import EpisodeKey, read_evaluation
+from lerobot_excav.evaluation.episode import EpisodeKey
+from lerobot_excav.evaluation.metrics import read_evaluation
 
 
 def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, metrics_line):

@@ -25,16 +25,16 @@ def operator(make_run, metrics_line):
 
 def test_rates_count_episodes_and_masses_count_scenes(runs):
     half, full = make_report(runs).runs
-    assert (half.target_success.estimate, half.episodes, half.seeds, half.scenes) == (0.5, 10, 1, 10)
-    assert (full.target_success.estimate, full.episodes, full.seeds, full.scenes) == (1.0, 20, 2, 10)
-    assert full.retained_mass_kg.estimate == 280.0
-    assert half.efficiency is None
+    assert (half["target_success"].estimate, half.episodes, half.seeds, half.scenes) == (0.5, 10, 1, 10)
+    assert (full["target_success"].estimate, full.episodes, full.seeds, full.scenes) == (1.0, 20, 2, 10)
+    assert full["retained_mass_kg"].estimate == 280.0
+    assert half["efficiency"] is None
 
 
 def test_efficiency_relates_to_the_operator_on_the_same_scenes(runs, operator):
     report = make_report(runs, operator=operator)
     assert [run.label for run in report.runs] == ["half", "full", "operator"]
-    assert [run.efficiency.estimate for run in report.runs] == pytest.approx([0.375, 0.7, 1.0])
+    assert [run["efficiency"].estimate for run in report.runs] == pytest.approx([0.375, 0.7, 1.0])
     assert report.operator == "scripted"
 
 
@@ -55,7 +55,7 @@ def test_a_file_with_several_evaluations_is_noted(make_run, metrics_line):
 def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, metrics_line):
     run = make_run("a", [metrics_line(i, retained_mass_kg=37.0 * i % 11) for i in range(10)])
     first, second = (make_report([run], seed=seed) for seed in (0, 5))
-    assert first.runs[0].retained_mass_kg != second.runs[0].retained_mass_kg
+    assert first.runs[0]["retained_mass_kg"] != second.runs[0]["retained_mass_kg"]
     assert "seed 5" in report_text(second)
 
 

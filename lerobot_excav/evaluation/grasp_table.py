@@ -1,0 +1,103 @@
+"""FR5Grasp-v0 in reports: success, and apart from it which block was grasped."""
+
+from dataclasses import dataclass
+
+from lerobot_excav.evaluation.episode import Episode
+from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
+
+NO_BLOCK = -1
+"""`first_grasped_block` of an episode in which no block was lifted."""
+
+COMMANDED, OTHER, NONE = GRASPED = ("commanded", "other", "none")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspEpisode(Episode):
+    """Outcome of one grasping episode.
+
+    Attributes:
+        final_target_id: Block that is commanded at the end; it differs from `target_id` where the command changed.
+        mask_noise: How the mask was disturbed.
+        mask_noise_px: By how much [px].
+        retarget_frame: Frame at which the command changed; None if it did not.
+        episode_return: Sum of the rewards.
+        first_grasped_block: First block that the fingers lifted; -1 if they lifted none.
+        target_in_tray: Whether the commanded block rests in the tray.
+        blocks_in_tray: How many blocks do.
+    """
+
+    final_target_id: int
+    mask_noise: str
+    mask_noise_px: int
+    retarget_frame: int | None
+    episode_return: float
+    first_grasped_block: int
+    target_in_tray: bool
+    blocks_in_tray: int
+
+    @property
+    def grasped(self) -> str:
+        """Which block was grasped first: `commanded` (at the end of the episode), `other` or `none`."""
+        if self.first_grasped_block == NO_BLOCK:
+            return NONE
+        return COMMANDED if self.first_grasped_block == self.final_target_id else OTHER
+
+    @property
+    def has_grasped(self) -> bool:
+        """Whether any block was grasped."""
+        return self.grasped != NONE
+
+    @property
+    def target_selected(self) -> bool | None:
+        """Of episodes that grasped a block: whether the first was the commanded one."""
+        return self.grasped == COMMANDED if self.has_grasped else None
+
+    @property
+    def placed(self) -> bool | None:
+        """Of episodes that grasped the commanded block first: whether they succeeded."""
+        return self.is_success if self.grasped == COMMANDED else None
+
+    @property
+    def mask(self) -> str:
+        """What the mask showed, in words."""
+        noise = "" if self.mask_noise == "none" else f", {self.mask_noise} {self.mask_noise_px} px"
+        change = "" if self.retarget_frame is None else f", changed at frame {self.retarget_frame}"
+        return f"{self.mask_condition}{noise}{change}"
+
+
+def _legend(operator: str | None) -> list[str]:
+    lines = [
+        "Success: at the end the commanded block, and no other, rests in the tray, released.",
+        "Target selection: of the episodes that grasped any block, the share whose first was the commanded one.",
+        "Placed: of the episodes that grasped the commanded block first, the share that succeeded.",
+        f"First grasped: episodes by the first block that was lifted, {' / '.join(GRASPED)}.",
+    ]
+    return lines if operator is None else [*lines, f"Operator: {operator}."]
+
+
+GRASP = TaskTable(
+    task="FR5Grasp-v0",
+    episode=GraspEpisode,
+    constants={
+        "mask_condition": "mask conditions",
+        "mask_noise": "kinds of mask noise",
+        "mask_noise_px": "strengths of mask noise",
+        "retarget_frame": "times of the change of target",
+        "simulation_version": "versions of the simulation",
+    },
+    setting={"mask": "mask"},
+    columns=(
+        Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
+        Column(key="episode_return", header="return", kind=Kind.MEAN, field="episode_return"),
+        Column(key="grasped", header="grasped any [%]", kind=Kind.RATE, field="has_grasped"),
+        Column(
+            key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"
+        ),
+        Column(key="placed", header="placed [%]", kind=Kind.RATE, field="placed"),
+        Column(key="first_grasped", header="first grasped", kind=Kind.COUNTS, field="grasped", words=GRASPED),
+    ),
+    compared=("success", "episode_return"),
+    world="was played in version {simulation_version} of the simulation",
+    simulation="version {simulation_version}",
+    legend=_legend,
+)

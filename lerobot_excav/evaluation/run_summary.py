@@ -1,0 +1,109 @@
+"""A run in numbers: one row of a report."""
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from lerobot_excav.evaluation.comparison import matched, means_by_key
+from lerobot_excav.evaluation.run import Run
+from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
+from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateOf(Interval):
+    """A rate of some of the episodes.
+
+    Attributes:
+        n: How many episodes it is the rate of.
+    """
+
+    n: int
+
+
+Value = Interval | dict[str, int] | None
+"""An estimate, counts by word, or None where nothing can be said."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSummary:
+    """One row of a report.
+
+    Attributes:
+        label: Name of the run.
+        table: What reports know of its task.
+        episodes: Number of episodes, over all seeds.
+        seeds: Number of evaluations, one per training seed.
+        scenes: Number of scenes and targets.
+        constants: What all episodes share.
+        setting: What tells the run apart, by header.
+        values: The measures, by the key of their column.
+    """
+
+    label: str
+    table: TaskTable
+    episodes: int
+    seeds: int
+    scenes: int
+    constants: dict[str, Any]
+    setting: dict[str, str]
+    values: dict[str, Value]
+
+    def __getitem__(self, key: str) -> Any:
+        """Return a measure by the key of its column."""
+        return self.values[key]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row as plain data."""
+        counts = {"episodes": self.episodes, "seeds": self.seeds, "scenes": self.scenes}
+        values = {
+            key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()
+        }
+        return {"label": self.label, "task": self.table.task, **counts, **self.constants, **values}
+
+
+def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSummary:
+    """Sum up a run.
+
+    Args:
+        run: The run.
+        operator: An operator's run on at least the same scenes and targets, for the ratios.
+        rng: Source of the bootstrap.
+
+    Raises:
+        DatasetError: The operator's run lacks scenes and targets, or played another world.
+    """
+    first = run.episodes[0]
+    return RunSummary(
+        label=run.label,
+        table=run.table,
+        episodes=len(run.episodes),
+        seeds=len(run.evaluations),
+        scenes=len(run.keys),
+        constants=run.constants,
+        setting={header: str(getattr(first, field)) for header, field in run.table.setting.items()},
+        values={column.key: _value(column, run, operator, rng) for column in run.table.columns},
+    )
+
+
+def _value(column: Column, run: Run, operator: Run | None, rng: np.random.Generator) -> Value:
+    if column.kind is Kind.MEAN:
+        return bootstrap_mean(means_by_key(run, column.field), rng)
+    if column.kind is Kind.RATIO:
+        if operator is None:
+            return None
+        return bootstrap_ratio(means_by_key(run, column.field), matched(run, operator, column.field), rng)
+    outcomes = [getattr(episode, column.field) for episode in run.episodes]
+    if column.kind is Kind.COUNTS:
+        found = Counter(outcomes)
+        return {word: found[word] for word in column.words}
+    return _rate([outcome for outcome in outcomes if outcome is not None], of=len(outcomes))
+
+
+def _rate(outcomes: list[bool], *, of: int) -> Interval | None:
+    if not outcomes:
+        return None
+    rate = wilson_interval(sum(outcomes), len(outcomes))
+    return rate if len(outcomes) == of else RateOf(**asdict(rate), n=len(outcomes))
