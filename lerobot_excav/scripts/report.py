@@ -4,12 +4,19 @@ RESULTS are metrics files (--env.metrics_path of lerobot-eval), or folders with 
 names a run; files given the same LABEL= are training seeds of one policy. With several runs, each is compared with
 the first, scene by scene.
 
+With --rows, a TOML file says what stands on a whole page: tables beside published figures, where every row comes from,
+success against training, a video grid.
+
 Examples:
   lerobot-excav report outputs/metrics.jsonl
   lerobot-excav report outputs/metrics.jsonl --operator=outputs/operator.jsonl --out=outputs/report
       also relate the retained mass to the operator's, from `lerobot-excav bench operator`; write report.md, report.json
   lerobot-excav report no_mask=a1.jsonl no_mask=a2.jsonl mask=b1.jsonl mask=b2.jsonl
       two policies, two training seeds each
+  lerobot-excav report --rows=experiments/fr5_grasp/rows.toml --out=results/fr5_grasp
+      the page of an experiment, from what has been run of it
+  lerobot-excav report --rows=experiments/fr5_grasp/rows.toml --metrics=results/fr5_grasp/metrics --out=outputs/page
+      the same from the copies that a page keeps
 """
 
 import argparse
@@ -24,7 +31,11 @@ from lerobot_excav.evaluation.run import Run
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("results", metavar="RESULTS", nargs="+", help="[LABEL=]FILE or folder")
+    parser.add_argument("results", metavar="RESULTS", nargs="*", help="[LABEL=]FILE or folder")
+    parser.add_argument("--rows", type=Path, help="TOML file of a page, in place of RESULTS")
+    parser.add_argument(
+        "--metrics", type=Path, help="with --rows: folder of the metrics in place of the file's"
+    )
     parser.add_argument("--operator", type=Path, help="metrics file of an operator on the same scenes")
     parser.add_argument("--out", type=Path, help="folder for report.md and report.json")
     parser.add_argument("--seed", type=int, default=0, help="seed of the bootstrap (default: 0)")
@@ -32,6 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, report, write."""
+    require(
+        bool(arguments.results) != (arguments.rows is not None), "give either RESULTS or --rows, and not both"
+    )
+    if arguments.rows is not None:
+        return _page(arguments)
+    require(arguments.metrics is None, f"--metrics={arguments.metrics} is of use with --rows only")
     operator = arguments.operator and Run(
         label="operator", evaluations=(read_evaluation(arguments.operator),)
     )
@@ -41,6 +58,23 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         write_report(report, text, arguments.out)
         print(f"written: {arguments.out / 'report.md'}, {arguments.out / 'report.json'}")
+    return 0
+
+
+def _page(arguments: argparse.Namespace) -> int:
+    """Make the page of an experiment."""
+    from lerobot_excav.evaluation.result_page.contents import read_contents
+    from lerobot_excav.evaluation.result_page.page import make_page
+    from lerobot_excav.evaluation.result_page.page_files import write_page
+    from lerobot_excav.evaluation.result_page.page_text import page_text
+
+    require(arguments.operator is None, "--operator is of use with RESULTS only; give it a row of the page")
+    page = make_page(read_contents(arguments.rows, metrics=arguments.metrics), seed=arguments.seed)
+    if arguments.out is None:
+        print(page_text(page))
+        return 0
+    for path in write_page(page, arguments.out):
+        print(f"written: {path}")
     return 0
 
 

@@ -1,0 +1,56 @@
+"""Where an evaluation comes from: its command and code, and the training of its policy.
+
+The record of its stage lies beside the metrics file, or beside their folder, as a JSON file of the same name. Copies of
+metrics files keep theirs, with the training in it.
+"""
+
+import json
+import re
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.evaluation.experiment.stage_record import StageRecord, record_path
+from lerobot_excav.evaluation.training import Training, read_training
+
+_POLICY_PATH = re.compile(r"--policy\.path[= ](\S+)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Command and code of an evaluation, and the training of its policy.
+
+    Attributes:
+        record: What was run; None if the evaluation was run by hand.
+        training: How the policy was trained; None if its checkpoint is unknown or gone.
+    """
+
+    record: StageRecord | None = None
+    training: Training | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record's entries, with those of the training in `training`."""
+        record = asdict(self.record) if self.record else {}
+        return {**record, "training": self.training.as_dict() if self.training else None}
+
+
+def read_provenance(metrics: Path) -> Provenance:
+    """Read where an evaluation comes from.
+
+    Args:
+        metrics: Its metrics file.
+    """
+    path = record_path(metrics.parent) if metrics.stem == "metrics" else metrics.with_suffix(".json")
+    if not path.is_file():
+        return Provenance()
+    content = json.loads(path.read_text())
+    training = content.pop("training", None)
+    record = StageRecord(**content) if content else None
+    if training is not None:
+        return Provenance(record=record, training=Training(**training))
+    return Provenance(record=record, training=_training(record))
+
+
+def _training(record: StageRecord | None) -> Training | None:
+    found = _POLICY_PATH.search(record.command) if record else None
+    return read_training(Path(found[1])) if found else None

@@ -1,0 +1,189 @@
+"""A result page in numbers: rows with where they come from, differences and curves."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lerobot_excav.evaluation.comparison import Difference, compare
+from lerobot_excav.evaluation.metrics import read_evaluation
+from lerobot_excav.evaluation.provenance import Provenance, read_provenance
+from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
+from lerobot_excav.evaluation.result_page.curves import Curve, read_curve
+from lerobot_excav.evaluation.run import Run
+from lerobot_excav.evaluation.run_summary import RunSummary, summarise
+from lerobot_excav.evaluation.training import Training
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageRow:
+    """A row in numbers.
+
+    Attributes:
+        row: What the page says of it.
+        run: The episodes.
+        summary: The measures.
+        provenance: Command, code and training.
+    """
+
+    row: Row
+    run: Run
+    summary: RunSummary
+    provenance: Provenance
+
+    @property
+    def metrics(self) -> Path:
+        """The metrics file."""
+        return self.run.evaluations[0].path
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of the evaluation."""
+        return self.run.evaluations[0].seed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row as plain data."""
+        return {
+            **self.summary.as_dict(),
+            "about": self.row.about,
+            "paper": dict(self.row.paper or {}),
+            "seed": self.seed,
+            "provenance": self.provenance.as_dict(),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageDifference:
+    """A row compared with a reference on the scenes that both have played.
+
+    Attributes:
+        label: The row.
+        reference: What it is compared with.
+        scenes: How many scenes and targets.
+        differences: Row minus reference, by measure.
+    """
+
+    label: str
+    reference: str
+    scenes: int
+    differences: list[Difference]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageSection:
+    """A table in numbers.
+
+    Attributes:
+        section: What the page says of it.
+        rows: The rows that have been run.
+        missing: Labels of those that have not.
+        differences: To the section's reference.
+    """
+
+    section: Section
+    rows: list[PageRow]
+    missing: list[str]
+    differences: list[PageDifference]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the section as plain data."""
+        return {
+            "title": self.section.title,
+            "rows": [row.as_dict() for row in self.rows],
+            "missing": self.missing,
+            "differences": [asdict(difference) for difference in self.differences],
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultPage:
+    """Everything a result page says.
+
+    Attributes:
+        contents: What was asked for.
+        sections: The tables.
+        curves: Success against training.
+        bootstrap_seed: Seed of all resampling.
+    """
+
+    contents: Contents
+    sections: list[PageSection]
+    curves: list[Curve]
+    bootstrap_seed: int
+
+    @property
+    def rows(self) -> list[PageRow]:
+        """All rows that have been run."""
+        return [row for section in self.sections for row in section.rows]
+
+    @property
+    def trainings(self) -> list[Training]:
+        """The checkpoints that were evaluated, each once."""
+        found = {
+            (row.provenance.training.name, row.provenance.training.steps): row.provenance.training
+            for row in self.rows
+            if row.provenance.training is not None
+        }
+        return list(found.values())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the page as plain data."""
+        return {
+            "title": self.contents.title,
+            "sections": [section.as_dict() for section in self.sections],
+            "curves": [curve.as_dict() for curve in self.curves],
+            "bootstrap_seed": self.bootstrap_seed,
+        }
+
+
+def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
+    """Read the evaluations of a page and sum them up; what has not been run is left out and named.
+
+    Args:
+        contents: What stands on the page.
+        seed: Seed of the bootstrap.
+
+    Raises:
+        DatasetError: A metrics file cannot be used, or rows cannot be compared.
+    """
+    rng = np.random.default_rng(seed)
+    rows = {row.label: _row(contents, row, rng) for row in contents.rows if _is_run(contents, row)}
+    return ResultPage(
+        contents=contents,
+        sections=[_section(section, rows, rng) for section in contents.section],
+        curves=[curve for curve in map(read_curve, contents.curve) if curve.points],
+        bootstrap_seed=seed,
+    )
+
+
+def _is_run(contents: Contents, row: Row) -> bool:
+    return contents.metrics_path(row.label).exists()
+
+
+def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
+    path = contents.metrics_path(row.label)
+    run = Run(label=row.label, evaluations=(read_evaluation(path),))
+    return PageRow(row=row, run=run, summary=summarise(run, None, rng), provenance=read_provenance(path))
+
+
+def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
+    present = [rows[row.label] for row in section.rows if row.label in rows]
+    reference = rows.get(section.reference or "")
+    return PageSection(
+        section=section,
+        rows=present,
+        missing=[row.label for row in section.rows if row.label not in rows],
+        differences=[
+            _difference(reference.run, row.run, rng) for row in present if reference and row is not reference
+        ],
+    )
+
+
+def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDifference:
+    """Compare on common scenes: a row may have played fewer of them than its reference."""
+    common = set(reference.keys) & set(run.keys)
+    differences = compare(reference.only(common), run.only(common), rng) if common else []
+    return PageDifference(
+        label=run.label, reference=reference.label, scenes=len(common), differences=differences
+    )

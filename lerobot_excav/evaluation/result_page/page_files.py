@@ -1,0 +1,64 @@
+"""The files of a result page."""
+
+import json
+import shutil
+from pathlib import Path
+
+from lerobot_excav.evaluation.provenance import Provenance, read_provenance
+from lerobot_excav.evaluation.result_page.contents import CURVES
+from lerobot_excav.evaluation.result_page.page import ResultPage
+from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
+from lerobot_excav.evaluation.result_page.plots import plot_curves
+from lerobot_excav.evaluation.result_page.video_grid import grid_clips, write_grid
+
+
+def write_page(page: ResultPage, folder: Path) -> list[Path]:
+    """Write a page, its data, and the metrics that it is made of.
+
+    `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4`, and `metrics/LABEL.jsonl`
+    with `metrics/LABEL.json`, where it comes from. A page can be made anew from these copies; a plot or video that
+    could not be made again, because checkpoints or videos are gone, stays.
+
+    Args:
+        page: The page.
+        folder: Where to; it is made.
+
+    Returns:
+        What was written, but for the copies.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    copies = folder / "metrics"
+    for row in page.rows:
+        _copy_metrics(row.metrics, copies / f"{row.row.label}.jsonl", row.provenance)
+    for curve in page.curves:
+        for point in curve.points:
+            copy = copies / CURVES / curve.name / f"{point.step:06d}.jsonl"
+            _copy_metrics(point.metrics, copy, read_provenance(point.metrics))
+    written = _pictures(page, folder)
+    beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if (folder / name).exists()]
+    texts = {
+        "report.md": page_text(page, files=beside),
+        "report.json": json.dumps(page.as_dict(), indent=1) + "\n",
+        "rows.jsonl": "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    return [*(folder / name for name in texts), *written]
+
+
+def _copy_metrics(metrics: Path, copy: Path, provenance: Provenance) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    if metrics.resolve() != copy.resolve():
+        shutil.copyfile(metrics, copy)
+    copy.with_suffix(".json").write_text(json.dumps(provenance.as_dict(), indent=1) + "\n")
+
+
+def _pictures(page: ResultPage, folder: Path) -> list[Path]:
+    written = []
+    if page.curves:
+        plot_curves(page.curves, folder / CURVE_PLOT)
+        written.append(folder / CURVE_PLOT)
+    if clips := grid_clips(page):
+        write_grid(folder / VIDEO_GRID, clips)
+        written.append(folder / VIDEO_GRID)
+    return written

@@ -1,0 +1,225 @@
+"""A result page in words: Markdown whose tables read well unrendered."""
+
+from collections.abc import Sequence
+
+from lerobot_excav.evaluation.report_text import (
+    difference_cells,
+    markdown_table,
+    simulations,
+    value_text,
+)
+from lerobot_excav.evaluation.result_page.curves import Curve, CurvePoint
+from lerobot_excav.evaluation.result_page.page import PageDifference, PageRow, PageSection, ResultPage
+from lerobot_excav.evaluation.task_table import Column, Kind
+from lerobot_excav.evaluation.training import Training
+
+CURVE_PLOT = "success.png"
+VIDEO_GRID = "rollouts.mp4"
+
+
+def page_text(page: ResultPage, *, files: Sequence[str] = ()) -> str:
+    """Write a page as Markdown.
+
+    Args:
+        page: The page.
+        files: Names of the plots and videos that lie beside it.
+    """
+    parts = [f"# {page.contents.title}", "", *_paragraph(page.contents.text)]
+    for section in page.sections:
+        parts += _section(section)
+    if not page.rows:
+        return "\n".join([*parts, "Nothing has been run yet.", ""])
+    parts += _curves(page.curves, files)
+    if VIDEO_GRID in files:
+        parts += ["## Rollouts", "", *_video(page), ""]
+    parts += _trainings(page)
+    parts += ["## How to read this", "", *(f"- {line}" for line in _legend(page)), ""]
+    parts += _commands(page)
+    return "\n".join(parts)
+
+
+def _paragraph(text: str) -> list[str]:
+    return [text.strip(), ""] if text.strip() else []
+
+
+def _section(section: PageSection) -> list[str]:
+    parts = [f"## {section.section.title}", "", *_paragraph(section.section.text)]
+    if section.rows:
+        parts += [*_outcomes(section.rows), "", *_choices(section.rows), ""]
+    if section.differences:
+        parts += [*_differences(section), ""]
+    if section.missing:
+        parts += [f"Not run: {', '.join(section.missing)}.", ""]
+    return parts
+
+
+def _outcomes(rows: Sequence[PageRow]) -> list[str]:
+    """Lay out what decides, beside the paper's figures."""
+    table = rows[0].summary.table
+    columns = [table.column(key) for key in table.compared]
+    in_paper = [column for column in columns if any(column.key in (row.row.paper or {}) for row in rows)]
+    header = ["setting", *table.setting, "n"]
+    for column in columns:
+        header += [column.header, *(["paper"] if column in in_paper else [])]
+    return markdown_table(header, [[*_name(row), *_outcome_cells(row, columns, in_paper)] for row in rows])
+
+
+def _name(row: PageRow) -> list[str]:
+    return [row.row.about, *row.summary.setting.values(), str(row.summary.episodes)]
+
+
+def _outcome_cells(row: PageRow, columns: Sequence[Column], in_paper: Sequence[Column]) -> list[str]:
+    cells = []
+    for column in columns:
+        cells.append(value_text(column, row.summary[column.key]))
+        if column in in_paper:
+            figure = (row.row.paper or {}).get(column.key)
+            cells.append("-" if figure is None else f"{figure:g}")
+    return cells
+
+
+def _choices(rows: Sequence[PageRow]) -> list[str]:
+    """Lay out the other measures."""
+    table = rows[0].summary.table
+    columns = [column for column in table.columns if column.key not in table.compared]
+    header = ["setting", *table.setting, "n", *(_full_header(column) for column in columns)]
+    return markdown_table(
+        header,
+        [[*_name(row), *(value_text(c, row.summary[c.key]) for c in columns)] for row in rows],
+    )
+
+
+def _full_header(column: Column) -> str:
+    return f"{column.header}: {' / '.join(column.words)}" if column.kind is Kind.COUNTS else column.header
+
+
+def _differences(section: PageSection) -> list[str]:
+    rows = {row.row.label: row for row in section.rows}
+    lines = [_difference(rows[d.label], d) for d in section.differences if d.differences]
+    if not lines:
+        return []
+    reference = section.differences[0].reference
+    header = [
+        "setting",
+        *section.rows[0].summary.table.setting,
+        "scenes",
+        f"success minus `{reference}` [%]",
+        "p",
+    ]
+    return markdown_table(header, lines)
+
+
+def _difference(row: PageRow, difference: PageDifference) -> list[str]:
+    table = row.summary.table
+    first = next(d for d in difference.differences if d.p_value is not None)
+    column = next(table.column(key) for key in table.compared if table.column(key).field == first.measure)
+    return [
+        row.row.about,
+        *row.summary.setting.values(),
+        str(difference.scenes),
+        *difference_cells(column, first),
+    ]
+
+
+def _curves(curves: Sequence[Curve], files: Sequence[str]) -> list[str]:
+    if not curves:
+        return []
+    rows = [_point(curve, point) for curve in curves for point in curve.points]
+    sets = sorted({point.scene_set for curve in curves for point in curve.points})
+    return [
+        f"## Success against training, on `{'`, `'.join(sets)}` scenes",
+        "",
+        *(
+            [f"![Success against training steps and minutes]({CURVE_PLOT})", ""]
+            if CURVE_PLOT in files
+            else []
+        ),
+        *markdown_table(("policy", "step", "minutes", "n", "success [%]"), rows),
+        "",
+    ]
+
+
+def _point(curve: Curve, point: CurvePoint) -> list[str]:
+    success = value_text(_SUCCESS, point.success)
+    return [curve.label, str(point.step), _number(point.minutes), str(point.n), success]
+
+
+_SUCCESS = Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _video(page: ResultPage) -> list[str]:
+    lines = [f"[{VIDEO_GRID}]({VIDEO_GRID}), the mask tinted; from top to bottom:", ""]
+    return [
+        *lines,
+        *(f"- `{clips.label}`, episodes {_list(clips.episodes)}" for clips in page.contents.clips),
+    ]
+
+
+def _list(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers))
+
+
+def _trainings(page: ResultPage) -> list[str]:
+    if not page.trainings:
+        return []
+    header = ("training", "data", "demonstrations", "steps", "batch", "samples", "minutes", "seed", "commit")
+    rows = [_training(training) for training in page.trainings]
+    return ["## Training", "", *markdown_table(header, rows), ""]
+
+
+def _training(training: Training) -> list[str]:
+    held_out = f" ({training.held_out} held out)" if training.held_out else ""
+    return [
+        training.name,
+        training.dataset,
+        f"{_or_dash(training.demonstrations)}{held_out}",
+        _or_dash(training.steps),
+        str(training.batch_size),
+        _or_dash(training.samples),
+        _number(training.minutes),
+        _or_dash(training.seed),
+        (training.commit or "-")[:9],
+    ]
+
+
+def _or_dash(value: int | None) -> str:
+    return "-" if value is None else str(value)
+
+
+def _legend(page: ResultPage) -> list[str]:
+    lines = [
+        "Brackets: 95 % intervals; Wilson's for rates over episodes, bootstrap for means over scenes and targets "
+        f"(seed {page.bootstrap_seed}).",
+        *page.rows[0].summary.table.legend(None),
+        "Differences are paired by scene and target, on the scenes that both have played; p from McNemar's exact test.",
+        "One training seed per policy: the intervals say nothing about how trainings differ.",
+        f"Simulation: {simulations([row.summary for row in page.rows])}.",
+        "Machine-readable: [report.json](report.json), a line per row in [rows.jsonl](rows.jsonl); every episode: "
+        "[metrics](metrics).",
+    ]
+    versions = _packages(page)
+    return [*lines, f"Versions: {versions}."] if versions else lines
+
+
+def _packages(page: ResultPage) -> str:
+    found = {row.provenance.record and tuple(row.provenance.record.packages.items()) for row in page.rows}
+    return "; or ".join(", ".join(f"{k} {v}" for k, v in sorted(packages)) for packages in found if packages)
+
+
+def _commands(page: ResultPage) -> list[str]:
+    """List the commands, those of the trainings first."""
+    parts = []
+    for training in page.trainings:
+        if training.command:
+            parts += [f"# training {training.name}, seed {_or_dash(training.seed)}", training.command, ""]
+    for row in page.rows:
+        record = row.provenance.record
+        if record is not None:
+            changed = " and changes" if record.modified else ""
+            commit = f", commit {record.commit[:9]}{changed}" if record.commit else ""
+            parts += [f"# {row.row.label}, seed {_or_dash(row.seed)}{commit}", record.command, ""]
+    return ["## Commands", "", "```bash", *parts[:-1], "```", ""] if parts else []

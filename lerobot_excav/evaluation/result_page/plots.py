@@ -1,0 +1,56 @@
+"""Plots of a result page."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lerobot_excav.evaluation.result_page.curves import Curve, CurvePoint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SIZE_IN = (8.0, 3.2)
+_DPI = 90
+
+
+def plot_curves(curves: Sequence[Curve], path: Path) -> None:
+    """Draw success against training steps and, where logs tell, against training minutes.
+
+    Args:
+        curves: One line each, with 95 % intervals.
+        path: PNG file to write; its folder is made.
+    """
+    # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
+    from matplotlib.figure import Figure
+
+    timed = any(point.minutes is not None for curve in curves for point in curve.points)
+    figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
+    axes = figure.subplots(1, 2 if timed else 1, sharey=True, squeeze=False)[0]
+    for curve in curves:
+        _draw(axes[0], curve.label, [(point.step, point) for point in curve.points])
+        if timed:
+            known = [(point.minutes, point) for point in curve.points if point.minutes is not None]
+            _draw(axes[1], curve.label, known)
+    axes[0].set(xlabel="training steps", ylabel="success [%]", ylim=(-3, 103))
+    if timed:
+        axes[1].set(xlabel="training time [min]")
+    for axis in axes:
+        axis.grid(alpha=0.3)
+    axes[-1].legend(loc="lower right", fontsize=8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def _draw(axis: "Axes", label: str, points: Sequence[tuple[float, CurvePoint]]) -> None:
+    success = [point.success for _, point in points]
+    axis.errorbar(
+        [place for place, _ in points],
+        [100.0 * rate.estimate for rate in success],
+        yerr=[
+            [100.0 * (rate.estimate - rate.low) for rate in success],
+            [100.0 * (rate.high - rate.estimate) for rate in success],
+        ],
+        marker="o",
+        capsize=3,
+        label=label,
+    )

@@ -1,0 +1,170 @@
+"""Rollouts side by side: the videos of `lerobot-eval` as tiles of one small video, the mask tinted."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
+from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
+
+MAX_BYTES = 1_500_000
+"""What a video in a repository may weigh."""
+
+FRAMES_PER_SECOND = 25
+TINT_RGB = (235, 60, 40)
+SUCCESS_RGB, FAILURE_RGB = (60, 180, 75), (128, 128, 128)
+
+_TINT = 0.45
+_TILE_HEIGHT = 192
+_BORDER = 4
+_QUALITIES = (26, 30, 34, 38, 42)  # constant rate factors of x264, from good to coarse
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """A tile of the grid.
+
+    Attributes:
+        path: Video of one episode.
+        masks: What the mask marked; drawn into the video.
+        is_success: Whether the episode succeeded; the colour of the border.
+    """
+
+    path: Path
+    masks: Sequence[ShownMask]
+    is_success: bool
+
+
+def grid_clips(page: ResultPage) -> list[list[Clip]]:
+    """Return the clips of a page, row by row; empty where videos are gone or too few.
+
+    Raises:
+        RenderingError: Pictures cannot be made on this machine.
+    """
+    rows = {row.row.label: row for row in page.rows}
+    return [
+        [_clip(rows[clips.label], number) for number in clips.episodes]
+        for clips in page.contents.clips
+        if clips.label in rows and all(_video(rows[clips.label], n).is_file() for n in clips.episodes)
+    ]
+
+
+def _video(row: PageRow, number: int) -> Path:
+    """Return the video of an episode where `lerobot-eval --output_dir=FOLDER` leaves it, beside the metrics."""
+    found = sorted((row.metrics.parent / "videos").glob(f"*/eval_episode_{number}.mp4"))
+    return found[0] if found else row.metrics.parent / "none"
+
+
+def _clip(row: PageRow, number: int) -> Clip:
+    # In the order in which they were played, as the videos are numbered.
+    key, episode = list(row.run.evaluations[0].episodes.items())[number]
+    height, width = next(read_video(_video(row, number))).shape[:2]
+    masks = shown_masks(row.run, key, height=height, width=width)
+    return Clip(path=_video(row, number), masks=masks, is_success=episode.is_success)
+
+
+def read_video(path: Path) -> Iterator[Image]:
+    """Yield the pictures of a video, uint8 (H, W, 3)."""
+    with av.open(str(path)) as container:
+        for frame in container.decode(video=0):
+            yield frame.to_ndarray(format="rgb24")
+
+
+def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
+    """Write clips as one video, in real time, as fine as `MAX_BYTES` allows.
+
+    Shorter clips stand still at their end. The border of a tile is green if its episode succeeded.
+
+    Args:
+        path: File to write (mp4); its folder is made. It appears when the video is complete.
+        rows: Clips row by row.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    pictures = _grid_pictures(rows)
+    for quality in _QUALITIES:
+        _encode(partial, pictures, quality)
+        if partial.stat().st_size <= MAX_BYTES:
+            break
+    partial.replace(path)
+
+
+def _grid_pictures(rows: Sequence[Sequence[Clip]]) -> list[Image]:
+    tiles = [[_tiles(clip) for clip in row] for row in rows]
+    length = max(len(clip) for row in tiles for clip in row)
+    width = max(sum(clip[0].shape[1] for clip in row) for row in tiles)
+    return [
+        np.concatenate([_band([clip[min(i, len(clip) - 1)] for clip in row], width) for row in tiles])
+        for i in range(length)
+    ]
+
+
+def _band(tiles: Sequence[Image], width: int) -> Image:
+    """Put tiles beside each other, and black to their right."""
+    band = np.concatenate(tiles, axis=1)
+    return np.pad(band, ((0, 0), (0, width - band.shape[1]), (0, 0)))
+
+
+def _tiles(clip: Clip) -> list[Image]:
+    """Return the pictures of a clip at the grid's size and rate, tinted and framed."""
+    stride = max(1, round(_rate(clip.path) / FRAMES_PER_SECOND))
+    colour = SUCCESS_RGB if clip.is_success else FAILURE_RGB
+    return [
+        framed(enlarged(tinted(image, _mask_at(clip.masks, number))), colour)
+        for number, image in enumerate(read_video(clip.path))
+        if number % stride == 0
+    ]
+
+
+def _rate(path: Path) -> float:
+    with av.open(str(path)) as container:
+        return float(container.streams.video[0].average_rate)
+
+
+def _mask_at(masks: Sequence[ShownMask], frame: int) -> NDArray[np.bool_]:
+    return [mask.pixels for mask in masks if mask.since <= frame][-1]
+
+
+def tinted(image: Image, pixels: NDArray[np.bool_]) -> Image:
+    """Return a picture with some pixels tinted.
+
+    Args:
+        image: uint8 (H, W, 3).
+        pixels: bool (H, W).
+    """
+    result = image.copy()
+    result[pixels] = ((1.0 - _TINT) * image[pixels] + _TINT * np.array(TINT_RGB)).astype(np.uint8)
+    return result
+
+
+def enlarged(image: Image) -> Image:
+    """Return a picture with every pixel repeated until it is about as high as a tile."""
+    times = max(1, round(_TILE_HEIGHT / image.shape[0]))
+    return image.repeat(times, axis=0).repeat(times, axis=1)
+
+
+def framed(image: Image, colour: tuple[int, int, int]) -> Image:
+    """Return a picture whose border has a colour."""
+    result = image.copy()
+    for edge in (result[:_BORDER], result[-_BORDER:], result[:, :_BORDER], result[:, -_BORDER:]):
+        edge[...] = colour
+    return result
+
+
+def _encode(path: Path, pictures: Sequence[Image], quality: int) -> None:
+    height, width = (size - size % 2 for size in pictures[0].shape[:2])
+    with av.open(str(path), mode="w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(FRAMES_PER_SECOND))
+        stream.height, stream.width, stream.pix_fmt = height, width, "yuv420p"
+        stream.options = {"crf": str(quality), "preset": "slow"}
+        for image in pictures:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))

@@ -1,0 +1,42 @@
+import pytest
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.result_page.contents import read_contents
+
+ROW = '{ label = "a", about = "x" }'
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text):
+        path = tmp_path / "rows.toml"
+        path.write_text(f'title = "t"\nmetrics = "m"\n{text}')
+        return read_contents(path)
+
+    return read
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("colour = 1", r"\['colour'\] is not known in Contents; allowed: .*'section'"),
+        ('[[section]]\ntitle = "s"\nrows = [{ label = "a" }]', "a Row is incomplete: .*about"),
+        (f'[[section]]\ntitle = "s"\nrows = [{ROW}, {ROW}]', r"\['a'\] stands on the page twice"),
+        (f'[[section]]\ntitle = "s"\nreference = "b"\nrows = [{ROW}]', "'b' is no row; allowed: a"),
+        ('[[clips]]\nlabel = "b"\nepisodes = [1]', "'b' is no row"),
+        ("[[", "is no TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_used_says_why(read, text, message):
+    with pytest.raises(ConfigurationError, match=message):
+        read(text)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"--rows=.*none\.toml does not exist"):
+        read_contents(tmp_path / "none.toml")
+
+
+def test_metrics_lie_in_a_folder_or_a_file(tmp_path, read):
+    contents = read(f'[[section]]\ntitle = "s"\nrows = [{ROW}]')
+    assert str(contents.metrics_path("a")) == "m/a.jsonl"

@@ -1,0 +1,127 @@
+import json
+
+import numpy as np
+import pytest
+
+from lerobot_excav.evaluation.result_page import video_grid
+from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
+from lerobot_excav.evaluation.result_page.page import make_page
+from lerobot_excav.evaluation.result_page.page_files import write_page
+from lerobot_excav.evaluation.result_page.page_text import page_text
+
+from .conftest import contents
+
+
+@pytest.fixture(autouse=True)
+def masks(monkeypatch):
+    """Masks without a simulation."""
+    mask = ShownMask(since=0, pixels=np.zeros((24, 32), dtype=bool))
+    monkeypatch.setattr(video_grid, "shown_masks", lambda *_, **__: [mask])
+
+
+def test_rows_know_their_numbers_their_seed_and_where_they_come_from(finished):
+    paired, zero = make_page(finished).rows
+    assert (paired.summary["success"].estimate, zero.summary["success"].estimate) == (1.0, 0.0)
+    assert paired.seed == 1000
+    assert paired.provenance.record.commit.startswith("0123")
+    training = paired.provenance.training
+    assert (training.name, training.dataset, training.steps, training.minutes) == (
+        "paired",
+        "pairs",
+        2000,
+        20.0,
+    )
+    assert (training.demonstrations, training.held_out, training.samples) == (200, 40, 32000)
+
+
+def test_rows_are_compared_with_the_reference_on_common_scenes(finished):
+    (section,) = make_page(finished).sections
+    (difference,) = section.differences
+    assert (difference.label, difference.reference, difference.scenes) == ("zero", "paired", 5)
+    assert difference.differences[0].difference.estimate == -1.0
+    assert difference.differences[0].p_value == pytest.approx(2 / 2**5)
+
+
+def test_what_was_not_run_is_named(finished):
+    page = make_page(finished)
+    assert page.sections[0].missing == ["later"]
+    assert "Not run: later." in page_text(page)
+
+
+def test_curves_tell_success_by_step_and_minutes(finished):
+    (curve,) = make_page(finished).curves
+    assert [(p.step, p.minutes, p.n, p.success.estimate) for p in curve.points] == [
+        (1000, 10.0, 4, 0.5),
+        (2000, 20.0, 4, 1.0),
+    ]
+    assert curve.points[0].scene_set == "val"
+
+
+def test_the_text_sets_figures_beside_the_papers(finished):
+    text = page_text(make_page(finished))
+    assert "# Does it obey?" in text
+    assert "Told before." in text
+    assert "| paired  | correct | 10 | 100.0 [72.2, 100.0] | 96" in text
+    assert "| 3.0 [3.0, 3.0]" in text
+    assert "0 / 0 / 5" in text
+    assert "commanded / other / none" in text
+    assert "| 200 (40 held out) | 2000  | 16" in text
+    assert "lerobot-eval --policy.path=" in text
+    assert "seed 1000, commit 012345678" in text
+    assert "lerobot 0.6.1" in text
+
+
+def test_a_page_of_nothing_says_so(tmp_path):
+    text = page_text(make_page(contents(tmp_path)))
+    assert "Nothing has been run yet." in text
+
+
+def test_the_page_is_written_with_data_plot_video_and_metrics(finished, tmp_path):
+    out = tmp_path / "results"
+    write_page(make_page(finished), out)
+    report = json.loads((out / "report.json").read_text())
+    row = report["sections"][0]["rows"][0]
+    assert row["paper"] == {"success": 96.0, "episode_return": 658.0}
+    assert row["provenance"]["command"].startswith("lerobot-eval")
+    assert row["provenance"]["training"]["steps"] == 2000
+    assert report["curves"][0]["points"][0]["minutes"] == 10.0
+    lines = [json.loads(line) for line in (out / "rows.jsonl").read_text().splitlines()]
+    assert [(line["label"], line["seed"]) for line in lines] == [("paired", 1000), ("zero", 1000)]
+    assert (out / "success.png").stat().st_size < 100_000
+    assert (out / "rollouts.mp4").stat().st_size < video_grid.MAX_BYTES
+    text = (out / "report.md").read_text()
+    assert "](success.png)" in text
+    assert "](rollouts.mp4)" in text
+
+
+def test_a_page_can_be_made_anew_from_its_copies(finished, tmp_path):
+    out = tmp_path / "results"
+    write_page(make_page(finished), out)
+    first = (out / "report.md").read_text()
+    again = make_page(contents(tmp_path, metrics=out / "metrics"))
+    write_page(again, out)
+    assert (out / "report.md").read_text() == first
+
+
+def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line, write_evaluation):
+    lines = [grasp_line(i, episode_return=float(i * i % 7)) for i in range(9)]
+    write_evaluation("test/later", lines, tmp_path / "gone")
+    first, second = (make_page(finished, seed=seed).rows[2].summary["episode_return"] for seed in (0, 5))
+    assert first != second
+
+
+def test_a_row_whose_checkpoint_is_gone_still_has_its_command(
+    finished, tmp_path, grasp_line, write_evaluation
+):
+    write_evaluation("test/later", [grasp_line(0)], tmp_path / "gone")
+    row = make_page(finished).rows[2]
+    assert row.provenance.training is None
+    assert row.provenance.record.command.endswith("--seed=1000")
+
+
+def test_a_row_run_by_hand_has_no_record(finished, tmp_path, grasp_line, write_evaluation):
+    write_evaluation("test/later", [grasp_line(0)], tmp_path / "gone")
+    (tmp_path / "test" / "later.json").unlink()
+    row = make_page(finished).rows[2]
+    assert row.provenance.record is None
+    assert "never run" in page_text(make_page(finished))

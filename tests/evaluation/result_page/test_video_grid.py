@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.evaluation.result_page import video_grid
+from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
+from lerobot_excav.evaluation.result_page.video_grid import Clip, framed, read_video, tinted, write_grid
+
+from .conftest import write_video
+
+
+@pytest.fixture
+def clip(tmp_path):
+    def make(name, *, is_success=True, frames=20, marked=(slice(0), slice(0)), since=0):
+        path = tmp_path / f"{name}.mp4"
+        write_video(path, frames=frames)
+        nothing = np.zeros((24, 32), dtype=bool)
+        pixels = nothing.copy()
+        pixels[marked] = True
+        masks = [ShownMask(since=0, pixels=nothing), ShownMask(since=since, pixels=pixels)]
+        return Clip(path=path, masks=masks, is_success=is_success)
+
+    return make
+
+
+def test_clips_stand_in_rows_at_half_their_rate(clip, tmp_path):
+    path = tmp_path / "new" / "grid.mp4"
+    write_grid(path, [[clip("a"), clip("b", is_success=False)], [clip("c", frames=10)]])
+    pictures = list(read_video(path))
+    assert len(pictures) == 10  # 20 frames at 50 per second
+    assert pictures[0].shape == (2 * 192, 2 * 256, 3)
+    assert not list(path.parent.glob("*.partial"))
+    assert pictures[0][300, 400].max() < 10  # no clip here
+
+
+def test_the_border_tells_success(clip, tmp_path):
+    write_grid(tmp_path / "grid.mp4", [[clip("a"), clip("b", is_success=False)]])
+    picture = next(read_video(tmp_path / "grid.mp4")).astype(int)
+    red, green, _ = picture[100, 1]
+    assert green - red > 50
+    red, green, _ = picture[100, 256 + 1]
+    assert abs(green - red) < 20
+
+
+def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
+    marked = (slice(8, 16), slice(8, 24))
+    write_grid(tmp_path / "grid.mp4", [[clip("a", marked=marked, since=10)]])
+    pictures = [picture.astype(int) for picture in read_video(tmp_path / "grid.mp4")]
+    redness = [picture[96, 128, 0] - picture[96, 128, 2] for picture in pictures]
+    assert max(redness[:4]) < 20
+    assert min(redness[6:]) > 40
+
+
+def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch):
+    tried = []
+    encode = video_grid._encode
+    monkeypatch.setattr(video_grid, "_encode", lambda *a: (tried.append(a[2]), encode(*a)))
+    monkeypatch.setattr(video_grid, "MAX_BYTES", 10)
+    write_grid(tmp_path / "grid.mp4", [[clip("a")]])
+    assert tried == list(video_grid._QUALITIES)
+
+
+def test_tinting_and_framing_leave_the_picture_as_it_was():
+    image = np.full((20, 20, 3), 100, dtype=np.uint8)
+    tinted(image, np.ones((20, 20), dtype=bool))
+    framed(image, (0, 0, 0))
+    assert (image == 100).all()
