@@ -1,1 +1,1 @@
-"""LeRobot teleoperators that drive the excavator: a gamepad, and the scripted operator."""
+"""LeRobot teleoperators that drive the simulated machines: a gamepad, and the scripted operators."""

@@ -1,50 +1,28 @@
 """Configuration of `--robot.type=excavator_sim`."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import TARGETS_PER_SCENE, require_task, require_worksite_settings
-from lerobot_excav.errors import require, require_choice
-
-ADVANCE_MODES = ("episode", "button")
+from lerobot_excav.envs.settings import require_task, require_worksite_settings
+from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 
 
 @RobotConfig.register_subclass("excavator_sim")
 @dataclass(kw_only=True)
-class ExcavatorSimConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class ExcavatorSimConfig(SimulatedRobotConfig):
     """Set up the simulated excavator from LeRobot's command line.
 
-    Attributes:
-        task: Name of the task in the gym namespace `lerobot_excav`.
-        fps: Frames per second of simulated time, which every `send_action` advances by one frame. Give the
-            command the same: `--dataset.fps` when recording, `--fps` when rolling out.
-        observation_height: Height of every picture [px].
-        observation_width: Width of every picture [px].
-        scene_set: Stream of scenes: `train`, `val` or `test`.
-        scene_id: First scene.
-        target_id: First target in it, 0 to 3.
+    Attributes besides those of `SimulatedRobotConfig`:
         soil: Soil preset.
         fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
-        advance: What leads to the next target: `episode`, so that every recorded episode has its own, or
-            `button`, so that only the side-channel key `next_scene` does.
-        session_log: JSON Lines file about the recorded episodes (see `session_log.py`), by default
-            `outputs/excavator_sessions/<date>_<time>.jsonl` below the working directory.
         depth: Whether `ExcavatorSim.depth_m` offers the depth image registered with the main camera.
     """
 
     task: str = "Scoop-v0"
     fps: int = 10
-    observation_height: int = 96
-    observation_width: int = 128
-    scene_set: str = "train"
-    scene_id: int = 0
-    target_id: int = 0
     soil: str = "sand"
     fidelity: str = "standard"
-    advance: str = "episode"
-    session_log: Path | None = None
     depth: bool = False
 
     def __post_init__(self) -> None:
@@ -56,8 +34,3 @@ class ExcavatorSimConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classe
         super().__post_init__()
         require_task("robot.task", self.task)
         require_worksite_settings(self, prefix="robot.")
-        require(
-            self.scene_id >= 0, f"robot.scene_id={self.scene_id} is not possible; scenes are numbered from 0."
-        )
-        require_choice("robot.target_id", self.target_id, range(TARGETS_PER_SCENE))
-        require_choice("robot.advance", self.advance, ADVANCE_MODES)

@@ -5,14 +5,14 @@ from typing import override
 
 from lerobot_excav.envs.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.robots.excavator_sim.features import NEXT_SCENE, REINITIALISE
+from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
 from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping
-from lerobot_excav.teleoperators.excavator_teleoperator import ExcavatorTeleoperator
+from lerobot_excav.teleoperators.simulation_teleoperator import SimulationTeleoperator
 
 
-class ExcavatorJoystick(ExcavatorTeleoperator):
+class ExcavatorJoystick(SimulationTeleoperator):
     """Drive the excavator with the two sticks of a gamepad.
 
     Args:
@@ -22,6 +22,7 @@ class ExcavatorJoystick(ExcavatorTeleoperator):
 
     config_class = ExcavatorJoystickConfig
     name = "excavator_joystick"
+    action_names = ACTION_NAMES
 
     def __init__(
         self, config: ExcavatorJoystickConfig, *, open_device: Callable[..., Gamepad] = open_gamepad

@@ -4,25 +4,10 @@ from dataclasses import dataclass
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
-from lerobot_excav.errors import require
+from lerobot_excav.teleoperators.config_scripted_teleoperator import ScriptedTeleoperatorConfig
 
 
 @TeleoperatorConfig.register_subclass("excavator_operator")
 @dataclass(kw_only=True)
-class ExcavatorOperatorConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
-    """Set up the scripted operator from LeRobot's command line.
-
-    Attributes:
-        seed: Seeds how the operator varies its cycles. With the scene and the target it fixes the
-            demonstration, so recording an episode again gives the same one.
-    """
-
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Validate the fields.
-
-        Raises:
-            ConfigurationError: `seed` is negative.
-        """
-        require(self.seed >= 0, f"teleop.seed={self.seed} is not possible; give a number from 0 on.")
+class ExcavatorOperatorConfig(ScriptedTeleoperatorConfig):
+    """Set up the excavator's scripted operator from LeRobot's command line."""

@@ -154,12 +154,12 @@ def test_being_driven_home_restarts_the_scene_once(make_robot: MakeRobot) -> Non
 
 
 def test_the_connected_robot_can_be_found(make_robot: MakeRobot) -> None:
-    with pytest.raises(DeviceError, match="0 simulated excavators"):
-        live.connected_excavator()
+    with pytest.raises(DeviceError, match="0 robots of type excavator_sim"):
+        live.connected_robot("excavator_sim")
     robot = make_robot()
-    assert live.connected_excavator() is robot
+    assert live.connected_robot("excavator_sim") is robot
     make_robot()
-    with pytest.raises(DeviceError, match="2 simulated excavators"):
-        live.connected_excavator()
+    with pytest.raises(DeviceError, match="2 robots of type excavator_sim"):
+        live.connected_robot("excavator_sim")
     robot.disconnect()
-    assert live.connected_excavator() is not robot
+    assert live.connected_robot("excavator_sim") is not robot

@@ -12,7 +12,7 @@ from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
-from lerobot_excav.robots.excavator_sim.session_log import SessionLog, default_path
+from lerobot_excav.robots.session_log import SessionLog, default_path
 
 MakeRobot = Callable[..., ExcavatorSim]
 STILL = dict.fromkeys(ACTION_NAMES, 0.0)
@@ -139,7 +139,7 @@ def test_a_disconnected_robot_no_longer_listens(make_robot: MakeRobot) -> None:
 
 
 def test_by_default_the_log_is_where_lerobot_puts_its_outputs() -> None:
-    path = default_path(datetime(2026, 1, 2, 3, 4, 5))
+    path = default_path("excavator_sessions", datetime(2026, 1, 2, 3, 4, 5))
     assert path.as_posix() == "outputs/excavator_sessions/2026-01-02_03-04-05.jsonl"
 
 

@@ -24,9 +24,14 @@ from typing import Any
 from lerobot_excav.errors import DeviceError
 
 
-def default_path(now: datetime) -> Path:
-    """Return where a session that began at a time is logged unless the user says otherwise."""
-    return Path("outputs", "excavator_sessions", f"{now:%Y-%m-%d_%H-%M-%S}.jsonl")
+def default_path(folder: str, now: datetime) -> Path:
+    """Return where a session that began at a time is logged unless the user says otherwise.
+
+    Args:
+        folder: Folder below LeRobot's `outputs` for the sessions of one kind of robot.
+        now: When the session began.
+    """
+    return Path("outputs", folder, f"{now:%Y-%m-%d_%H-%M-%S}.jsonl")
 
 
 class SessionLog:

@@ -1,19 +1,23 @@
-"""What everything that drives the excavator shares as a LeRobot teleoperator."""
+"""What everything that drives a simulated machine shares as a LeRobot teleoperator."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from lerobot.teleoperators.teleoperator import Teleoperator
 
-from lerobot_excav.envs.features import ACTION_NAMES
 
+class SimulationTeleoperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """A teleoperator that gives a machine's commands, gets no feedback and needs no calibration.
 
-class ExcavatorTeleoperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
-    """A teleoperator that gives the excavator's four commands, gets no feedback and needs no calibration."""
+    Attributes:
+        action_names: Names of the commands, as the robot takes them.
+    """
+
+    action_names: ClassVar[tuple[str, ...]]
 
     @property
     def action_features(self) -> dict[str, type]:
-        """Joystick commands in [-1, 1], as the robot takes them; the keys of buttons are not recorded."""
-        return dict.fromkeys(ACTION_NAMES, float)
+        """Commands as the robot takes them; the keys of buttons are not recorded."""
+        return dict.fromkeys(self.action_names, float)
 
     @property
     def feedback_features(self) -> dict[str, type]:
