@@ -16,7 +16,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo table-manipulation test fuzz lint type wheel clean
+.PHONY: help setup demo demo-fr5 table-manipulation test fuzz lint type wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -40,6 +40,9 @@ $(READY): pyproject.toml uv.lock
 
 demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
+
+demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leaves a video and a table (< 3 min)
+	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo_fr5.sh outputs/demo_fr5
 
 table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; goes on where it stopped; JOBS=2)
 	@$(RUN)/lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=$(JOBS)
