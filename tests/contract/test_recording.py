@@ -1,21 +1,18 @@
-"""What LeRobot announces decides where episodes begin and what the session log holds."""
+"""What LeRobot announces decides where episodes of any robot begin and what the session log holds."""
 
 import json
 import logging
 from collections.abc import Callable, Iterator
-from datetime import datetime
 from typing import Any
 
 import pytest
 
-from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
-from lerobot_excav.errors import DeviceError
-from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
-from lerobot_excav.robots.session_log import SessionLog, default_path
+from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
-MakeRobot = Callable[..., ExcavatorSim]
-STILL = dict.fromkeys(ACTION_NAMES, 0.0)
+MakeRobot = Callable[..., SimulatedRobot[Any]]
+Action = dict[str, float]
+RecordEpisode = Callable[..., tuple[int, ...]]
 
 
 @pytest.fixture(autouse=True)
@@ -27,29 +24,36 @@ def announcements_are_heard() -> Iterator[None]:
     logging.getLogger().setLevel(level)
 
 
-def record_episode(robot: ExcavatorSim, index: int, *, frames: int = 2) -> tuple[int, ...]:
+@pytest.fixture
+def record_episode(still: Action) -> RecordEpisode:
     """Play LeRobot's part of an episode; return its scene, target and steps before its first frame."""
-    logging.info(f"Recording episode {index}")
-    first = robot.get_observation()
-    for _ in range(frames):
-        robot.send_action(STILL)
-    logging.info("Reset the environment")
-    robot.send_action(STILL)
-    return tuple(int(first[name]) for name in STATE_NAMES[:3])
+
+    def _record(robot: SimulatedRobot[Any], index: int, *, frames: int = 2) -> tuple[int, ...]:
+        logging.info(f"Recording episode {index}")
+        first = robot.get_observation()
+        for _ in range(frames):
+            robot.send_action(still)
+        logging.info("Reset the environment")
+        robot.send_action(still)
+        return tuple(int(first[name]) for name in robot.state_names[:3])
+
+    return _record
 
 
-def lines_of(robot: ExcavatorSim) -> list[dict[str, Any]]:
+def lines_of(robot: SimulatedRobot[Any]) -> list[dict[str, Any]]:
     path = robot.config.session_log
     assert path is not None
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def test_every_recorded_episode_has_its_own_scene_and_target(make_robot: MakeRobot) -> None:
+def test_every_recorded_episode_has_its_own_scene_and_target(
+    make_robot: MakeRobot, record_episode: RecordEpisode
+) -> None:
     robot = make_robot(scene_id=1, target_id=2)
     assert [record_episode(robot, i) for i in range(3)] == [(1, 2, 0), (1, 3, 0), (2, 0, 0)]
 
 
-def test_recording_again_repeats_the_scene(make_robot: MakeRobot) -> None:
+def test_recording_again_repeats_the_scene(make_robot: MakeRobot, record_episode: RecordEpisode) -> None:
     robot = make_robot()
     record_episode(robot, 0)
     assert record_episode(robot, 1) == (0, 1, 0)
@@ -59,28 +63,32 @@ def test_recording_again_repeats_the_scene(make_robot: MakeRobot) -> None:
     assert [(line["episode_index"], line["frames"]) for line in lines_of(robot)] == [(0, 2), (1, 5)]
 
 
-def test_a_resumed_recording_goes_on_where_it_stopped(make_robot: MakeRobot) -> None:
+def test_a_resumed_recording_goes_on_where_it_stopped(
+    make_robot: MakeRobot, record_episode: RecordEpisode
+) -> None:
     assert record_episode(make_robot(), 6) == (1, 2, 0)
 
 
-def test_with_buttons_only_the_scene_stays_until_a_press(make_robot: MakeRobot) -> None:
+def test_with_buttons_only_the_scene_stays_until_a_press(
+    make_robot: MakeRobot, record_episode: RecordEpisode, still: Action
+) -> None:
     robot = make_robot(advance="button")
     assert [record_episode(robot, i) for i in range(2)] == [(0, 0, 0), (0, 0, 0)]
-    robot.send_action(STILL | {"next_scene": 1.0})
+    robot.send_action(still | {"next_scene": 1.0})
     assert record_episode(robot, 2) == (0, 1, 0)
 
 
-def test_a_press_leaves_one_target_out(make_robot: MakeRobot) -> None:
+def test_a_press_leaves_one_target_out(
+    make_robot: MakeRobot, record_episode: RecordEpisode, still: Action
+) -> None:
     robot = make_robot()
     record_episode(robot, 0)
-    robot.send_action(STILL | {"next_scene": 1.0})
+    robot.send_action(still | {"next_scene": 1.0})
     assert [record_episode(robot, i) for i in (1, 2)] == [(0, 2, 0), (0, 3, 0)]
 
 
-def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
-    robot = make_robot(
-        scene_set="val", scene_id=3, fps=25, soil="gravel", fidelity="fast", observation_width=160
-    )
+def test_the_session_log_describes_each_episode(make_robot: MakeRobot, record_episode: RecordEpisode) -> None:
+    robot = make_robot(scene_set="val", scene_id=3, fps=25, observation_width=160)
     record_episode(robot, 0, frames=4)
     assert lines_of(robot) == []
     robot.disconnect()
@@ -92,29 +100,41 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot) -> None:
             "scene_id": 3,
             "target_id": 0,
             "fps": 25,
-            "soil": "gravel",
-            "fidelity": "fast",
             "observation_height": 96,
             "observation_width": 160,
-            "task": "Scoop-v0",
+            "task": robot.config.task,
+            **robot.describe_simulation(),
             "frames": 4,
             "restarts": [],
         }
     ]
 
 
-def test_restarts_within_an_episode_are_noted(make_robot: MakeRobot) -> None:
+def test_restarts_within_an_episode_are_noted(make_robot: MakeRobot, still: Action) -> None:
     robot = make_robot()
     logging.info("Recording episode 0")
-    robot.send_action(STILL | {"reinitialise": 1.0})  # LeRobot records this frame too
-    robot.send_action(STILL)
-    robot.send_action(STILL | {"reinitialise": 1.0})
-    robot.send_action(STILL)
+    robot.send_action(still | {"reinitialise": 1.0})  # LeRobot records this frame too
+    robot.send_action(still)
+    robot.send_action(still | {"reinitialise": 1.0})
+    robot.send_action(still)
     logging.info("Stop recording")
     assert [(line["frames"], line["restarts"]) for line in lines_of(robot)] == [(2, [0, 1])]
 
 
-def test_a_discarded_last_episode_is_not_logged(make_robot: MakeRobot) -> None:
+def test_a_robot_driven_home_between_episodes_starts_the_next_one_afresh(
+    make_robot: MakeRobot, record_episode: RecordEpisode
+) -> None:
+    robot = make_robot()
+    record_episode(robot, 0)
+    observation = robot.get_observation()
+    for _ in range(3):
+        robot.send_action({name: observation[name] for name in robot.state_names if name.endswith(".pos")})
+    assert record_episode(robot, 1) == (0, 1, 0)
+    logging.info("Stop recording")
+    assert [(line["frames"], line["restarts"]) for line in lines_of(robot)] == [(2, []), (2, [])]
+
+
+def test_a_discarded_last_episode_is_not_logged(make_robot: MakeRobot, record_episode: RecordEpisode) -> None:
     robot = make_robot()
     record_episode(robot, 0)
     logging.info("Re-record episode")
@@ -136,16 +156,3 @@ def test_a_disconnected_robot_no_longer_listens(make_robot: MakeRobot) -> None:
     robot.disconnect()
     logging.info("Recording episode 0")
     assert lines_of(robot) == []
-
-
-def test_by_default_the_log_is_where_lerobot_puts_its_outputs() -> None:
-    path = default_path("excavator_sessions", datetime(2026, 1, 2, 3, 4, 5))
-    assert path.as_posix() == "outputs/excavator_sessions/2026-01-02_03-04-05.jsonl"
-
-
-def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Any) -> None:
-    (tmp_path / "file").write_text("")
-    log = SessionLog(tmp_path / "file" / "session.jsonl", {})
-    log.begin(0, scene_id=0, target_id=0)
-    with pytest.raises(DeviceError, match=r"robot\.session_log=.*cannot be written"):
-        log.write()
