@@ -43,8 +43,7 @@ def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int
         Whether all succeeded.
 
     Raises:
-        ConfigurationError: `jobs` is not positive, a needed stage is neither finished nor chosen, or another process
-            is at a stage.
+        ConfigurationError: `jobs` is not positive, or a needed stage is neither finished nor chosen.
     """
     require(jobs >= 1, f"--jobs={jobs} must be at least 1")
     waiting = [stage for stage in stages if not stage.is_finished]
@@ -55,13 +54,13 @@ def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int
     try:
         while running or (waiting and not failed):
             if not failed:
-                _start_ready(experiment, waiting, running, jobs, say)
+                failed += _start_ready(experiment, waiting, running, jobs, say)
             for ended in [run for run in running if run.exit_code is not None]:
                 running.remove(ended)
                 if not _end(ended, say):
                     failed.append(ended.stage.name)
             time.sleep(POLL_S)
-    except (KeyboardInterrupt, ConfigurationError):
+    except KeyboardInterrupt:
         for run in running:
             run.stop()
             run.finish()
@@ -88,22 +87,29 @@ def _tell_finished(stages: Sequence[Stage], say: Say) -> None:
 
 def _start_ready(
     experiment: Experiment, waiting: list[Stage], running: list[StageRun], jobs: int, say: Say
-) -> None:
+) -> list[str]:
+    """Start the stages whose turn it is; return those that could not be started."""
     pending = {stage.name for stage in waiting} | {run.stage.name for run in running}
     ready = [stage for stage in waiting if not pending.intersection(stage.needs)]
+    refused = []
     for stage in ready[: max(0, jobs - len(running))]:
         waiting.remove(stage)
         log = experiment_log(experiment, stage)
         say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
         say("    " + " && \\\n    ".join(stage.shell_lines()))
-        running.append(StageRun(stage, experiment.environment, log))
+        try:
+            running.append(StageRun(stage, experiment.environment, log))
+        except ConfigurationError as error:
+            say(f"! {stage.name}: {error}")
+            refused.append(stage.name)
+    return refused
 
 
 def experiment_log(experiment: Experiment, stage: Stage) -> Path:
     """Return the file that takes a stage's output."""
     if stage.makes is not None:
         return log_path(stage.makes)
-    return Path("outputs") / f"{experiment.path.stem}-{stage.name}.log"
+    return Path("outputs") / f"{experiment.path.absolute().parent.name}-{stage.name}.log"
 
 
 def _end(run: StageRun, say: Say) -> bool:
