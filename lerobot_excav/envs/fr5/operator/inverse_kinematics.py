@@ -18,7 +18,7 @@ _TOLERANCE_M = 2e-4
 
 
 class GripperKinematics:
-    """Follow positions of the grasp point with the tool straight down.
+    """Follow positions of the grasp point while the tool turns straight down.
 
     It is asked for neighbouring positions one after the other and starts each search from the last solution.
     """
@@ -31,6 +31,7 @@ class GripperKinematics:
         self._configuration = mink.Configuration(spec.compile())
         self._configuration.update(const.HOME_JOINT_POS)
         self._down = self._configuration.get_transform_frame_to_world("grasp", "site").rotation()
+        self._start = self._down
         self._gripper = mink.FrameTask(
             "grasp", "site", position_cost=_POSITION_COST, orientation_cost=_DIRECTION_COST
         )
@@ -48,17 +49,22 @@ class GripperKinematics:
             Position of the grasp point there [m], (3,), world frame.
         """
         self._configuration.update(joint_pos)
-        return np.array(self._configuration.get_transform_frame_to_world("grasp", "site").translation())
+        pose = self._configuration.get_transform_frame_to_world("grasp", "site")
+        self._start = pose.rotation()
+        return np.array(pose.translation())
 
-    def joint_pos_at(self, grasp_pos_w: NDArray[np.float64]) -> NDArray[np.float64]:
+    def joint_pos_at(self, grasp_pos_w: NDArray[np.float64], *, upright: float = 1.0) -> NDArray[np.float64]:
         """Return the joint positions [rad], (6,), that bring the grasp point to a position near the last one.
 
         Out of reach, the arm comes as near as its joint limits allow.
 
         Args:
             grasp_pos_w: Wanted position [m], (3,), world frame.
+            upright: How far the tool has turned from its direction at the start to straight down, 0 to 1.
         """
-        self._gripper.set_target(mink.SE3.from_rotation_and_translation(self._down, grasp_pos_w))
+        turn = self._start.inverse() @ self._down
+        rotation = self._start @ mink.SO3.exp(upright * turn.log())
+        self._gripper.set_target(mink.SE3.from_rotation_and_translation(rotation, grasp_pos_w))
         for _ in range(_ITERATIONS):
             # A time step of one second: the velocity is the whole step of a Newton iteration.
             velocity = mink.solve_ik(

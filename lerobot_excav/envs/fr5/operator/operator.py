@@ -64,6 +64,6 @@ class ScriptedOperator:
         # Ticks of a frame are whole: the environment accepts no other frame rates.
         for _ in range(round(1.0 / (CONTROL_TICK_S * env.fps))):
             self._ticks += 1
-            pos_w, opening = self._plan.at(self._ticks * CONTROL_TICK_S)
-            joint_pos = self._kinematics.joint_pos_at(pos_w)
-        return np.append(joint_pos, opening).astype(np.float32)
+            command = self._plan.at(self._ticks * CONTROL_TICK_S)
+            joint_pos = self._kinematics.joint_pos_at(command.grasp_pos_w, upright=command.upright)
+        return np.append(joint_pos, command.opening).astype(np.float32)

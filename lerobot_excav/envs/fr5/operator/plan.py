@@ -43,6 +43,20 @@ class WayPoint(NamedTuple):
     opening: float
 
 
+class Command(NamedTuple):
+    """What a plan asks for at a moment.
+
+    Attributes:
+        grasp_pos_w: Position of the grasp point [m], (3,), world frame.
+        upright: How far the tool has turned from its direction at the start to straight down, 0 to 1.
+        opening: Target of the gripper [0..1].
+    """
+
+    grasp_pos_w: NDArray[np.float64]
+    upright: float
+    opening: float
+
+
 class Plan:
     """The path of one grasp.
 
@@ -58,11 +72,11 @@ class Plan:
         """Time of the last way-point [s]."""
         return self._way_points[-1].time_s
 
-    def at(self, time_s: float) -> tuple[NDArray[np.float64], float]:
-        """Return position of the grasp point [m], (3,), and target of the gripper at a time.
+    def at(self, time_s: float) -> Command:
+        """Return what is asked for at a time.
 
         Between two way-points the position follows the minimum-jerk polynomial (Flash and Hogan 1985, eq. 5), after
-        the last it stays.
+        the last it stays. The tool turns upright on the way to the first.
 
         Args:
             time_s: Time since the start [s].
@@ -71,8 +85,9 @@ class Plan:
             if time_s < end.time_s:
                 s = max(0.0, (time_s - start.time_s) / (end.time_s - start.time_s))
                 blend = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-                return start.pos_w + blend * (end.pos_w - start.pos_w), end.opening
-        return self._way_points[-1].pos_w, self._way_points[-1].opening
+                upright = blend if start is self._way_points[0] else 1.0
+                return Command(start.pos_w + blend * (end.pos_w - start.pos_w), upright, end.opening)
+        return Command(self._way_points[-1].pos_w, 1.0, self._way_points[-1].opening)
 
 
 def plan_grasp(
