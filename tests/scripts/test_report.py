@@ -79,3 +79,56 @@ def test_the_bootstrap_seed_is_an_option(metrics, capsys):
     path = metrics("a.jsonl", *(float(i * i) for i in range(9)))
     main(["report", str(path), "--seed=5"])
     assert "(seed 5)" in capsys.readouterr().out
+
+
+@pytest.fixture
+def rows(metrics, tmp_path):
+    """A page of two rows, one of which was run."""
+    metrics("test/mine.jsonl", 200.0, 220.0)
+    path = tmp_path / "rows.toml"
+    row = '{ label = "mine", about = "my policy", paper = { full_success = 91.0 } }'
+    path.write_text(f'''
+title = "Digging"
+metrics = "{tmp_path}/test"
+[[section]]
+title = "All"
+rows = [{row}, {{ label = "yours", about = "your policy" }}]
+''')
+    return path
+
+
+def test_a_page_is_printed(rows, capsys):
+    assert main(["report", f"--rows={rows}"]) == 0
+    text = capsys.readouterr().out
+    assert "# Digging" in text
+    assert "| my policy | sand | correct | 2" in text
+    assert "| 91 " in text
+    assert "Not run: yours." in text
+
+
+def test_a_page_is_written_and_made_anew_from_its_metrics(rows, tmp_path, capsys):
+    assert main(["report", f"--rows={rows}", f"--out={tmp_path / 'page'}"]) == 0
+    again = [
+        "report",
+        f"--rows={rows}",
+        f"--metrics={tmp_path / 'page/metrics'}",
+        f"--out={tmp_path / 'again'}",
+    ]
+    assert main(again) == 0
+    first, second = (tmp_path / name / "report.md" for name in ("page", "again"))
+    assert first.read_text() == second.read_text()
+    assert f"written: {second}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "give either RESULTS or --rows"),
+        (["a.jsonl", "--rows=r.toml"], "give either RESULTS or --rows"),
+        (["a.jsonl", "--metrics=m"], "--metrics=m is of use with --rows only"),
+        (["--rows=r.toml", "--operator=o"], "--operator is of use with RESULTS only"),
+    ],
+)
+def test_options_without_effect_are_refused(arguments, message, capsys):
+    assert main(["report", *arguments]) == 2
+    assert message in capsys.readouterr().err
