@@ -13,8 +13,8 @@ LAYERS = [
     ["envs.soil", "envs", "robots", "teleoperators", "datasets", "evaluation", "scripts"],
     ["policies"],
 ]
-# The list of what is registered names everything; the benchmark times the policies from outside.
-FREE = {"plugin", "evaluation.speed", "scripts.main"}
+# The list of what is registered names everything; the benchmark and the export use the policies from outside.
+FREE = {"plugin", "evaluation.speed", "scripts.main", "scripts.export"}
 
 
 def name_of(path):

@@ -13,6 +13,7 @@ COMMANDS = {
     "index": "rebuild the paired-scene index, complete a recording, print lerobot-train's episode flags",
     "qc": "check a dataset and replay a sample of its episodes",
     "report": "make the table of one or more evaluations, with intervals and comparisons",
+    "export": "write a small copy of a trained policy, with a model card",
     "experiment": "run the stages of an experiment that are not finished",
     "bench": "measure this machine or the scripted operator; put the soil to the test",
 }

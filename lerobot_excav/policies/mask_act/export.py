@@ -1,0 +1,110 @@
+"""Checkpoints to hand on: half precision, without what only training needs."""
+
+import copy
+import shutil
+from pathlib import Path
+
+import torch
+from lerobot.configs import PreTrainedConfig
+from safetensors.torch import save_file
+from torch import Tensor
+
+from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
+from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
+
+WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
+PROCESSORS = ("policy_preprocessor*", "policy_postprocessor*")
+TRAINING_ONLY = "model.action_encoder."  # the encoder of the variational latent, which is zero at run time
+
+
+def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = None) -> Path:
+    """Write a small copy of a trained policy that LeRobot loads like any other.
+
+    Parameters are stored in half precision (float16: 11 significant bits) and load into a float32 network as usual;
+    running statistics stay in float32, they are few and small. The encoder of the variational latent, the optimizer
+    and the training settings, with their local paths, stay behind. `use_vae` is false in the copy, so nothing is
+    missing when it is loaded; fine-tuning it trains without a latent.
+
+    Args:
+        checkpoint: A `pretrained_model` folder of lerobot-train.
+        out: Folder to write; files of an earlier export in it are replaced.
+        facts: What the model card tells beyond what the checkpoint knows.
+
+    Returns:
+        The folder written: `config.json`, `model.safetensors`, the processors, `README.md`.
+
+    Raises:
+        ConfigurationError: The folder is no checkpoint of `mask_act`, is the one to write, or holds a weight beyond
+            half precision.
+    """
+    require_checkpoint(checkpoint)
+    require(
+        checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder."
+    )
+    policy = MaskACTPolicy.from_pretrained(checkpoint)
+    weights = run_time_weights(policy)
+    config = copy.copy(policy.config)
+    config.use_vae, config.pretrained_path = False, None
+    card = model_card(checkpoint, config, parameter_count(policy), facts or CardFacts())
+    out.mkdir(parents=True, exist_ok=True)
+    save_file(weights, out / WEIGHTS, metadata={"format": "pt"})
+    config.save_pretrained(out)
+    for pattern in PROCESSORS:
+        for file in sorted(checkpoint.glob(pattern)):
+            shutil.copyfile(file, out / file.name)
+    (out / CARD).write_text(card)
+    return out
+
+
+def run_time_weights(policy: MaskACTPolicy) -> dict[str, Tensor]:
+    """Return what acting needs: parameters in half precision, statistics as they are.
+
+    Args:
+        policy: A trained policy.
+
+    Raises:
+        ConfigurationError: A parameter does not fit into half precision (beyond 65504, or not a number).
+    """
+    parameters = {name for name, _ in policy.named_parameters()}
+    weights = {}
+    for name, value in policy.state_dict().items():
+        if name.startswith(TRAINING_ONLY):
+            continue
+        weights[name] = value.half() if name in parameters else value
+        require(
+            bool(torch.isfinite(weights[name]).all()),
+            f"{name} holds values up to {value.abs().max():g}, beyond half precision (65504): the training diverged. "
+            "Export an earlier checkpoint.",
+        )
+    return weights
+
+
+def parameter_count(policy: MaskACTPolicy) -> int:
+    """Return the number of parameters that acting needs."""
+    return sum(
+        value.numel() for name, value in policy.named_parameters() if not name.startswith(TRAINING_ONLY)
+    )
+
+
+def require_checkpoint(checkpoint: Path) -> None:
+    """Raise unless a folder holds a policy of type `mask_act`.
+
+    Args:
+        checkpoint: The folder.
+
+    Raises:
+        ConfigurationError: A file is missing, or the policy is of another type.
+    """
+    missing = [name for name in (CONFIG, WEIGHTS) if not (checkpoint / name).is_file()]
+    require(
+        not missing,
+        f"checkpoint={checkpoint} has no {' and no '.join(missing)}; give the pretrained_model folder of a run of "
+        "lerobot-train, for example outputs/train/checkpoints/last/pretrained_model.",
+    )
+    config = PreTrainedConfig.from_pretrained(checkpoint)
+    if not isinstance(config, MaskACTConfig):
+        raise ConfigurationError(
+            f"checkpoint={checkpoint} holds a policy of type {config.type!r}; only mask_act can be exported."
+        )
