@@ -21,7 +21,6 @@ from lerobot.robots import Robot
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.settings import TARGETS_PER_SCENE
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
@@ -60,6 +59,7 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
         camera_names: Names of the pictures.
         action_low: Least value of each command, (actions,) or one for all.
         action_high: Greatest value of each command, (actions,) or one for all.
+        simulation_version: Version of the simulation, for session logs.
         session_folder: Where session logs are put by default, below `outputs`.
         cameras: The cameras by name, with the shape (H, W, 3) of their pictures.
         episode_count: Number of resets so far; changes exactly when an episode starts.
@@ -70,6 +70,7 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
     camera_names: ClassVar[tuple[str, ...]]
     action_low: ClassVar[float | NDArray[np.float64]]
     action_high: ClassVar[float | NDArray[np.float64]]
+    simulation_version: ClassVar[int]
     session_folder: ClassVar[str]
 
     def __init__(self, config: SimulatedRobotConfig) -> None:
@@ -236,7 +237,7 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
 
     def _describe_session(self) -> dict[str, Any]:
         return {
-            "simulation_version": SIMULATION_VERSION,
+            "simulation_version": self.simulation_version,
             "scene_set": self.config.scene_set,
             "fps": self.config.fps,
             "observation_height": self.config.observation_height,

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
 MakeRobot = Callable[..., SimulatedRobot[Any]]
@@ -95,7 +94,7 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot, record_ep
     assert lines_of(robot) == [
         {
             "episode_index": 0,
-            "simulation_version": SIMULATION_VERSION,
+            "simulation_version": robot.simulation_version,
             "scene_set": "val",
             "scene_id": 3,
             "target_id": 0,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.simulated_robot import ENDLESS, SimulatedRobot
@@ -26,6 +27,7 @@ class ExcavatorSim(SimulatedRobot[ExcavatorEnv]):
     action_names = ACTION_NAMES
     camera_names = CAMERAS
     action_low, action_high = -1.0, 1.0
+    simulation_version = SIMULATION_VERSION
     session_folder = "excavator_sessions"
     config: ExcavatorSimConfig
 

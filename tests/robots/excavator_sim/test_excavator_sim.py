@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from lerobot_excav.envs.features import ACTION_NAMES, STATE_NAMES
+from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
@@ -50,6 +51,7 @@ def test_the_soil_is_in_the_session_log(make_robot: MakeRobot) -> None:
     assert robot.config.session_log is not None
     line = json.loads(robot.config.session_log.read_text())
     assert (line["task"], line["soil"], line["fidelity"]) == ("Scoop-v0", "gravel", "fast")
+    assert line["simulation_version"] == SIMULATION_VERSION
 
 
 def test_commands_are_clipped_to_one(make_robot: MakeRobot) -> None:
