@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import TARGETS_PER_SCENE
+from lerobot_excav.envs.settings import SCENE_SETS, TARGETS_PER_SCENE, require_fps, require_image_size
 from lerobot_excav.errors import require, require_choice
 
 ADVANCE_MODES = ("episode", "button")
@@ -41,12 +41,16 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
     session_log: Path | None = None
 
     def __post_init__(self) -> None:
-        """Validate where to begin and how to go on; the subclass validates its simulation.
+        """Validate the fields; the subclass validates its task.
 
         Raises:
             ConfigurationError: A field has a value that the simulation cannot use.
         """
         super().__post_init__()
+        require_fps("robot.fps", self.fps)
+        for name in ("observation_height", "observation_width"):
+            require_image_size(f"robot.{name}", getattr(self, name))
+        require_choice("robot.scene_set", self.scene_set, SCENE_SETS)
         require(
             self.scene_id >= 0, f"robot.scene_id={self.scene_id} is not possible; scenes are numbered from 0."
         )

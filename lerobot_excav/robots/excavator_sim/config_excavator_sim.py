@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import require_task, require_worksite_settings
+from lerobot_excav.envs.settings import FIDELITIES, SOILS, require_task
+from lerobot_excav.errors import require_choice
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 
 
@@ -33,4 +34,5 @@ class ExcavatorSimConfig(SimulatedRobotConfig):
         """
         super().__post_init__()
         require_task("robot.task", self.task)
-        require_worksite_settings(self, prefix="robot.")
+        require_choice("robot.soil", self.soil, SOILS)
+        require_choice("robot.fidelity", self.fidelity, FIDELITIES)
