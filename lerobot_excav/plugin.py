@@ -3,25 +3,34 @@
 | kind | `--<kind>.type` | here |
 |---|---|---|
 | environment | `excavator` | `ExcavatorEnvConfig` |
+| environment | `fr5_grasp` | `FR5GraspEnvConfig` |
 | policy | `mask_act` | `MaskACTConfig` |
 | robot | `excavator_sim` | `ExcavatorSimConfig` |
+| robot | `fr5_sim` | `FR5SimConfig` |
 | teleoperator | `excavator_joystick` | `ExcavatorJoystickConfig` |
 | teleoperator | `excavator_operator` | `ExcavatorOperatorConfig` |
+| teleoperator | `fr5_operator` | `FR5OperatorConfig` |
 
 Importing a configuration registers it. LeRobot finds the class that belongs to it when a command needs it,
 so no simulator is loaded here.
 """
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
+from lerobot_excav.envs.configuration_fr5_grasp import FR5GraspEnvConfig
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
+from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
+from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
 
 __all__ = [
     "ExcavatorEnvConfig",
     "ExcavatorJoystickConfig",
     "ExcavatorOperatorConfig",
     "ExcavatorSimConfig",
+    "FR5GraspEnvConfig",
+    "FR5OperatorConfig",
+    "FR5SimConfig",
     "MaskACTConfig",
 ]

@@ -2,7 +2,10 @@
 
 import gymnasium as gym
 
-GYM_IDS = {"Scoop-v0": "lerobot_excav.envs.excavator.env:ExcavatorEnv"}
+GYM_IDS = {
+    "Scoop-v0": "lerobot_excav.envs.excavator.env:ExcavatorEnv",
+    "FR5Grasp-v0": "lerobot_excav.envs.fr5.env:FR5GraspEnv",
+}
 """Tasks by name, and the class that plays each."""
 
 for _task, _entry_point in GYM_IDS.items():

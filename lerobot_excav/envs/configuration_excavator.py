@@ -1,146 +1,42 @@
 """Configuration of `--env.type=excavator` for the commands of LeRobot."""
 
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, override
 
-import gymnasium as gym
-from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
-from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
-from lerobot_excav.envs.settings import (
-    RENDER_MODES,
-    require_episode_length,
-    require_integer,
-    require_task,
-    require_worksite_settings,
-)
-from lerobot_excav.errors import require, require_choice
-
-CAMERAS = ("main", "cab", "target_mask")
-STATE_SIZE = 8  # four joint positions [rad], four joint velocities [rad/s]
-ACTION_SIZE = 4  # swing, boom, arm, bucket
+from lerobot_excav.envs.configuration_simulation import SimulationEnvConfig
+from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.settings import EXCAVATOR_TASKS, FIDELITIES, SOILS
+from lerobot_excav.errors import require_choice
 
 
 @EnvConfig.register_subclass("excavator")
 @dataclass
-class ExcavatorEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class ExcavatorEnvConfig(SimulationEnvConfig):
     """Set up the excavator environment from LeRobot's command line.
 
-    `features` and `features_map` are derived from the other fields, whatever is given for them.
-    Feature names hold no slash, so that `--eval.recording=true` accepts them.
-
     Attributes:
-        task: Name of the task in the gym namespace `lerobot_excav`.
-        fps: Frames per second of simulated time; divides the 50 ticks of a second.
         episode_length: Frames after which an unfinished episode is cut off; None: those of 20 s.
-        observation_height: Height of every picture [px].
-        observation_width: Width of every picture [px].
-        scene_set: Stream of scenes: `train`, `val` or `test`. Evaluations meant for a report use `test`.
-        mask_condition: What the target mask shows: `correct`, `zero`, `random` or `mismatched`.
         soil: Soil preset.
         fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
-        metrics_path: JSON Lines file to which every finished episode is appended; see `envs.metrics_log`.
-        metrics_episodes: Number of episodes to write; give it `--eval.n_episodes` when the batch size does
-            not divide that, and LeRobot's surplus episodes stay out of the file. None writes all.
-        render_mode: `rgb_array`, from which LeRobot makes videos, or None.
     """
+
+    CAMERAS = CAMERAS
+    STATE_SIZE = len(STATE_NAMES)
+    ACTION_SIZE = len(ACTION_NAMES)
+    TASKS = EXCAVATOR_TASKS
 
     task: str | None = "Scoop-v0"
     fps: int = 10
-    episode_length: int | None = None
-    observation_height: int = 96
-    observation_width: int = 128
-    scene_set: str = "train"
-    mask_condition: str = "correct"
     soil: str = "sand"
     fidelity: str = "standard"
-    metrics_path: Path | None = None
-    metrics_episodes: int | None = None
-    render_mode: str | None = "rgb_array"
-    features: dict[str, PolicyFeature] = field(default_factory=dict)
-    features_map: dict[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Validate the fields and derive the features.
-
-        Raises:
-            ConfigurationError: A field has a value that the environment cannot use.
-        """
-        require_task("env.task", self.task)
-        require_worksite_settings(self, prefix="env.", fields=("mask_condition",))
-        require_episode_length("env.episode_length", self.episode_length)
-        require_choice("env.render_mode", self.render_mode, RENDER_MODES)
-        if self.metrics_episodes is not None:
-            hint = "It is the value of --eval.n_episodes; leave it out to write every episode."
-            require_integer("env.metrics_episodes", self.metrics_episodes, 1, hint=hint)
-        require(
-            self.metrics_episodes is None or self.metrics_path is not None,
-            f"env.metrics_episodes={self.metrics_episodes} has no effect without a file; "
-            "give --env.metrics_path as well.",
-        )
-        self._derive_features()
-
-    @property
-    def package_name(self) -> str:
-        """Name of the package whose import registers the gym ids."""
-        return "lerobot_excav.envs"
-
-    @property
-    def gym_id(self) -> str:
-        """Id of the environment in the registry of Gymnasium."""
-        return f"lerobot_excav/{self.task}"
-
-    @property
-    def gym_kwargs(self) -> dict[str, Any]:
-        """Arguments of `gymnasium.make` besides the id."""
-        return {
-            "task": self.task,
-            "fps": self.fps,
-            "episode_length": self.episode_length,
-            "observation_height": self.observation_height,
-            "observation_width": self.observation_width,
-            "scene_set": self.scene_set,
-            "mask_condition": self.mask_condition,
-            "soil": self.soil,
-            "fidelity": self.fidelity,
-            "render_mode": self.render_mode,
-        }
 
     @override
-    def create_envs(
-        self, n_envs: int, use_async_envs: bool = False
-    ) -> dict[str, dict[int, gym.vector.VectorEnv[Any, Any, Any]]]:
-        """Create the vector environment of one evaluation.
+    def __post_init__(self) -> None:
+        require_choice("env.soil", self.soil, SOILS)
+        require_choice("env.fidelity", self.fidelity, FIDELITIES)
+        super().__post_init__()
 
-        Args:
-            n_envs: Number of environments that run side by side.
-            use_async_envs: Whether each gets a process of its own; needs `n_envs` > 1 to have an effect.
-
-        Returns:
-            `{"excavator": {0: vector environment}}`.
-        """
-        from lerobot_excav.envs.metrics_log import MetricsLog
-        from lerobot_excav.envs.vector import make_vector_env
-
-        log = None
-        if self.metrics_path is not None:
-            log = MetricsLog(self.metrics_path, n_envs=n_envs, max_episodes=self.metrics_episodes)
-        vector = make_vector_env(self._make_one, n_envs, use_async=use_async_envs, metrics_log=log)
-        return {self.type: {0: vector}}
-
-    def _make_one(self) -> gym.Env[Any, Any]:
-        # Workers unpickle this bound method: that imports this module, hence the package that registers
-        # the gym ids, before `gym.make` looks them up.
-        return gym.make(self.gym_id, disable_env_checker=self.disable_env_checker, **self.gym_kwargs)
-
-    def _derive_features(self) -> None:
-        shape = (self.observation_height, self.observation_width, 3)
-        images = [f"{OBS_IMAGES}.{camera}" for camera in CAMERAS]
-        self.features = {
-            ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(ACTION_SIZE,)),
-            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(STATE_SIZE,)),
-            **{image: PolicyFeature(type=FeatureType.VISUAL, shape=shape) for image in images},
-        }
-        self.features_map = {ACTION: ACTION, "agent_pos": OBS_STATE, **{image: image for image in images}}
+    def _own_kwargs(self) -> dict[str, Any]:
+        return {"soil": self.soil, "fidelity": self.fidelity}

@@ -8,16 +8,19 @@ from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
 
-from lerobot_excav.envs import GYM_IDS
 from lerobot_excav.errors import require, require_choice
 
+EXCAVATOR_TASKS = ("Scoop-v0",)
+FR5_TASKS = ("FR5Grasp-v0",)
 SCENE_SETS = ("train", "val", "test")
 MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
+MASK_NOISES = ("none", "shift", "erode", "dilate")
 SOILS = ("sand", "gravel", "dirt", "wet_sand")
 FIDELITIES = ("fast", "standard", "fine")
 TARGETS_PER_SCENE = 4
 TICKS_PER_SECOND = 50
 EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
+FR5_EPISODE_DURATION_S = 8.0  # that of the arm (kind: paper, 400 frames at 50 Hz)
 RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
 
@@ -29,13 +32,24 @@ _CHOICES = {
 }
 
 
+def require_retarget_frame(field: str, frame: int | None, episode_length: int) -> None:
+    """Raise unless another block may be commanded at this frame; None: never.
+
+    Raises:
+        ConfigurationError: The frame is not one within the episode.
+    """
+    if frame is not None:
+        hint = f"An episode has {episode_length} frames; leave it out to command one block only."
+        require_integer(field, frame, 1, episode_length - 1, hint=hint)
+
+
 def require_task(field: str, task: str | None) -> None:
-    """Raise unless the task is one of this package.
+    """Raise unless the task is one of the excavator.
 
     Raises:
         ConfigurationError: The task is unknown.
     """
-    require_choice(field, task, tuple(GYM_IDS), hint="A task is a gym id without the part before the slash.")
+    require_choice(field, task, EXCAVATOR_TASKS, hint="A task is a gym id without the part before the slash.")
 
 
 def require_integer(field: str, value: Any, low: int, high: int | None = None, *, hint: str = "") -> None:

@@ -104,9 +104,7 @@ def measure_writing(*, quick: bool) -> list[Measurement]:
     copies = [replace(episode, pair=pair._replace(scene_id=number)) for number in range(4)]
     with tempfile.TemporaryDirectory() as folder:
         store = EpisodeStore(Path(folder) / "episodes")
-        dataset = create_dataset(
-            Path(folder) / "dataset", fps=settings.fps, height=settings.height, width=settings.width
-        )
+        dataset = create_dataset(Path(folder) / "dataset", settings)
         append_episode(dataset, copies[0], settings)  # the first call loads libraries
         start = time.perf_counter()
         for copy in copies[1:]:

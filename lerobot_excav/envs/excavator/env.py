@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.control import checked_action
 from lerobot_excav.envs.excavator.cycle import DigCycle
-from lerobot_excav.envs.excavator.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import Scene, draw_scene
 from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
+from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
+from lerobot_excav.envs.selection import select_scene_and_target
 from lerobot_excav.envs.settings import (
     EPISODE_DURATION_S,
     FIDELITIES,
@@ -25,13 +26,11 @@ from lerobot_excav.envs.settings import (
     require_episode_length,
     require_fps,
     require_image_size,
-    require_integer,
     require_task,
 )
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, require_choice
 
-RESET_OPTIONS = ("scene_id", "target_id")
 OBS_TYPES = ("pixels_agent_pos", "agent_pos")
 TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
 
@@ -188,7 +187,9 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             ConfigurationError: `scene_id` or `target_id` is no integer or out of range, or an option is unknown.
         """
         super().reset(seed=seed)
-        scene_id, target_id = self._select(seed, options or {})
+        scene_id, target_id = select_scene_and_target(
+            seed, options or {}, rng=self.np_random, target_count=TARGETS_PER_SCENE
+        )
         scene = draw_scene(self.scene_set, scene_id, soil=self.soil_name)
         self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
@@ -235,18 +236,6 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = self._main_img = None
-
-    def _select(self, seed: int | None, options: dict[str, Any]) -> tuple[int, int]:
-        """Choose scene and target from options, else seed, else by chance."""
-        for key in options:
-            if not key.startswith("lerobot_"):
-                require_choice("options", key, RESET_OPTIONS)
-        number = int(self.np_random.integers(2**31)) if seed is None else seed
-        scene_id = options.get("scene_id", number)
-        require_integer("scene_id", scene_id, 0, 2**63 - 1)
-        target_id = options.get("target_id", scene_id % TARGETS_PER_SCENE)
-        require_integer("target_id", target_id, 0, TARGETS_PER_SCENE - 1)
-        return int(scene_id), int(target_id)
 
     def _draw_mask(self, scene: Scene, target_id: int) -> NDArray[np.uint8]:
         points_w = self.renderer.terrain_points_w(self.worksite.soil)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.excavator.offscreen import create_context
 from lerobot_excav.envs.excavator.soil_picture import SoilPicture
+from lerobot_excav.envs.offscreen import create_context
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.errors import RenderingError, require, require_choice
 

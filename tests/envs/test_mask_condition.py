@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.excavator.mask_condition import conditioned_mask, corruption_rng
+from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.settings import MASK_CONDITIONS
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
