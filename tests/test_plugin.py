@@ -15,11 +15,14 @@ from lerobot.teleoperators import make_teleoperator_from_config
 from lerobot_excav import plugin
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
+from lerobot_excav.robots.fr5_sim.fr5_sim import FR5Sim
 from lerobot_excav.teleoperators.excavator_joystick.excavator_joystick import ExcavatorJoystick
 from lerobot_excav.teleoperators.excavator_operator.excavator_operator import ExcavatorOperator
+from lerobot_excav.teleoperators.fr5_operator.fr5_operator import FR5Operator
 
 ROBOT = ["--robot.type=excavator_sim", "--robot.fps=7"]
 ENV = ["--env.type=excavator", "--env.fps=7"]
+SIMULATORS = ("lerobot_excav.envs.excavator", "lerobot_excav.envs.fr5")
 BAD_FPS = "fps=7 is not known"
 
 # A setting of ours that cannot work: the command stops at it, and only if it knows the type.
@@ -86,7 +89,7 @@ def test_discovery_loads_no_simulator(outputs: dict[str, str], command: str) -> 
     loaded, modules = (line.split()[1:] for line in outputs[command].splitlines()[-2:])
     assert "lerobot_env_excav" in loaded
     assert not {"mujoco", "numba", "pygame"} & set(loaded)
-    assert not [name for name in modules if name.startswith("lerobot_excav.envs.excavator")]
+    assert not [name for name in modules if name.startswith(SIMULATORS)]
 
 
 @pytest.mark.parametrize(
@@ -95,6 +98,8 @@ def test_discovery_loads_no_simulator(outputs: dict[str, str], command: str) -> 
         (make_robot_from_config, plugin.ExcavatorSimConfig, ExcavatorSim),
         (make_teleoperator_from_config, plugin.ExcavatorJoystickConfig, ExcavatorJoystick),
         (make_teleoperator_from_config, plugin.ExcavatorOperatorConfig, ExcavatorOperator),
+        (make_robot_from_config, plugin.FR5SimConfig, FR5Sim),
+        (make_teleoperator_from_config, plugin.FR5OperatorConfig, FR5Operator),
     ],
 )
 def test_lerobot_finds_the_class_of_a_device(make: Any, config: Any, device: Any, tmp_path: Path) -> None:
@@ -115,4 +120,6 @@ def test_the_list_is_complete() -> None:
         "excavator_sim",
         "excavator_joystick",
         "excavator_operator",
+        "fr5_sim",
+        "fr5_operator",
     }
