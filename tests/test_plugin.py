@@ -119,6 +119,7 @@ def test_the_list_is_complete() -> None:
         "excavator_sim",
         "excavator_joystick",
         "excavator_operator",
+        "fr5_grasp",
         "fr5_sim",
         "fr5_operator",
     }
