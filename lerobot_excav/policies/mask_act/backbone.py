@@ -1,4 +1,4 @@
-"""Convolutional backbones that read four channels: red, green, blue, target mask."""
+"""Convolutional backbones that read red, green, blue, target mask and, if asked, the place of each pixel."""
 
 from collections import OrderedDict
 
@@ -31,9 +31,14 @@ class Backbone(nn.Module):
             self.feature_count = SMALL_STAGES[-1][0]
         else:
             self.stages, self.feature_count = torchvision_resnet(config, norm)
+        self.coordinate_channels = config.coordinate_channels
+        if config.coordinate_channels:
+            with_more_channels(next(m for m in self.stages.modules() if isinstance(m, nn.Conv2d)), 2)
 
     def forward(self, views: Tensor) -> Tensor:
         """Return the feature map, shape (N, feature_count, h, w), of views (N, 4, H, W)."""
+        if self.coordinate_channels:
+            views = torch.cat([views, coordinates(views).expand(views.shape[0], -1, -1, -1)], dim=1)
         # Channels last is the layout that convolutions on a CPU compute in: twice as fast in the first layer.
         features: Tensor = self.stages(views.contiguous(memory_format=torch.channels_last))
         return features
@@ -52,7 +57,7 @@ def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
     """
     stem = nn.Conv2d(3, SMALL_STEM_WIDTH, kernel_size=7, stride=4, padding=3, bias=False)
     nn.init.kaiming_normal_(stem.weight, mode="fan_out", nonlinearity="relu")
-    layers: list[nn.Module] = [with_mask_channel(stem), norm(SMALL_STEM_WIDTH), nn.ReLU(inplace=True)]
+    layers: list[nn.Module] = [with_more_channels(stem, 1), norm(SMALL_STEM_WIDTH), nn.ReLU(inplace=True)]
     width_in = SMALL_STEM_WIDTH
     for width, stride in SMALL_STAGES:
         same = width == width_in and stride == 1
@@ -88,24 +93,45 @@ def torchvision_resnet(config: MaskACTConfig, norm: type[nn.Module]) -> tuple[nn
         norm_layer=norm,
     )
     feature_count = resnet.fc.in_features
-    resnet.conv1 = with_mask_channel(resnet.conv1)
+    resnet.conv1 = with_more_channels(resnet.conv1, 1)
     # A ResNet's children run in their order of definition; the last two, pooling and classifier, stay behind.
     return nn.Sequential(OrderedDict(list(resnet.named_children())[:-2])), feature_count
 
 
-def with_mask_channel(stem: nn.Conv2d) -> nn.Conv2d:
-    """Widen a first convolution, in place, by one input channel that starts at zero weight.
+def with_more_channels(stem: nn.Conv2d, count: int) -> nn.Conv2d:
+    """Widen a first convolution, in place, by input channels that start at zero weight.
 
-    A fresh network is therefore blind to the mask, and equals its twin without one, until training finds a use for
-    it. Copying the mean of the RGB filters instead would start from a response to the mask as if it were brightness.
+    A fresh network is therefore blind to them, and equals its twin without them, until training finds a use for
+    them. Copying the mean of the RGB filters for a mask would start from a response to it as if it were brightness.
 
     Args:
-        stem: Convolution over RGB, without bias.
+        stem: Convolution without bias.
+        count: Channels to add.
 
     Returns:
-        The same layer, over RGB and mask.
+        The same layer.
     """
-    rgb = stem.weight.detach()
-    stem.weight = nn.Parameter(torch.cat([rgb, torch.zeros_like(rgb[:, :1])], dim=1))
-    stem.in_channels = 4
+    weight = stem.weight.detach()
+    stem.weight = nn.Parameter(
+        torch.cat([weight, torch.zeros_like(weight[:, :1]).expand(-1, count, -1, -1)], 1)
+    )
+    stem.in_channels += count
     return stem
+
+
+def coordinates(views: Tensor) -> Tensor:
+    """Return the row and column of every pixel, each from -1 to 1 (CoordConv, arXiv:1807.03247).
+
+    A convolution alone answers alike wherever a pattern lies, and attention adds positions to queries and keys only.
+    With these two channels the network can say where it sees the mask.
+
+    Args:
+        views: Pictures, shape (N, C, H, W).
+
+    Returns:
+        Shape (1, 2, H, W).
+    """
+    height, width = views.shape[-2:]
+    rows = torch.linspace(-1, 1, height, device=views.device, dtype=views.dtype)
+    columns = torch.linspace(-1, 1, width, device=views.device, dtype=views.dtype)
+    return torch.stack(torch.meshgrid(rows, columns, indexing="ij")).unsqueeze(0)

@@ -40,6 +40,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         main_camera: Image feature that the mask belongs to. None: the first camera that is not the mask.
         withhold_mask: Silence every path of the mask: the no-condition variant.
         target_token: Add one token pooled under the mask to the transformer encoder.
+        coordinate_channels: Show the backbone the row and column of every pixel, as two more channels.
         vision_backbone: "resnet_small", or a ResNet of torchvision ("resnet18", "resnet34", ...).
         pretrained_backbone_weights: torchvision weights to start from. None, the default, downloads nothing.
         backbone_norm: "batch" learns and averages batch statistics, "frozen" is ACT's fixed affine map. None:
@@ -62,6 +63,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     main_camera: str | None = None
     withhold_mask: bool = False
     target_token: bool = False
+    coordinate_channels: bool = False
 
     vision_backbone: str | None = None
     pretrained_backbone_weights: str | None = None
