@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from lerobot_excav.envs.excavator import offscreen
+from lerobot_excav.envs import offscreen
 from lerobot_excav.errors import RenderingError
 
 

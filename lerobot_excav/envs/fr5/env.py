@@ -266,7 +266,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "mask_condition": self.mask_condition,
             "mask_noise": self.mask_noise,
             "mask_noise_px": self.mask_noise_px,
-            "retarget_frame": self.retarget_frame,
+            "retarget_frame": np.nan if self.retarget_frame is None else self.retarget_frame,  # null in the file
             "fps": self.fps,
             "episode_length": self.episode_length,
             **self.grasp.episode_metrics,
