@@ -4,9 +4,8 @@ These tests would notice if a new version of LeRobot announced the phases of a r
 """
 
 import json
-import logging
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.scripts import lerobot_record, lerobot_replay
 
+from lerobot_excav.datasets.excavator_environment import EXCAVATOR
 from lerobot_excav.datasets.schema import dataset_features, excav_features
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.features import STATE_NAMES
@@ -29,35 +29,14 @@ CAMERAS = ("main", "cab", "target_mask")
 Run = Callable[..., None]
 
 
-@pytest.fixture(autouse=True)
-def logging_is_restored() -> Iterator[None]:
-    """LeRobot's commands replace the handlers of the root logger."""
-    root = logging.getLogger()
-    level, handlers = root.level, list(root.handlers)
-    yield
-    root.setLevel(level)
-    root.handlers[:] = handlers
-
-
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Run a command of LeRobot in this process, which has imported LeRobot already."""
+def run(run_command: Run) -> Run:
+    """Run a command on the excavator."""
+    return partial(_run_on_excavator, run_command)
 
-    def _run(main: Callable[[], None], *arguments: str) -> None:
-        common = [
-            *ROBOT,
-            f"--robot.calibration_dir={tmp_path}",
-            f"--robot.session_log={tmp_path / 'session.jsonl'}",
-        ]
-        common += [
-            "--dataset.repo_id=someone/dug",
-            f"--dataset.root={tmp_path / 'data'}",
-            "--play_sounds=false",
-        ]
-        monkeypatch.setattr(sys, "argv", ["command", *common, *arguments])
-        main()
 
-    return _run
+def _run_on_excavator(run_command: Run, main: Callable[[], None], *arguments: str) -> None:
+    run_command(main, *ROBOT, *arguments)
 
 
 @pytest.fixture
@@ -80,7 +59,7 @@ def session_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def dataset_of(folder: Path) -> LeRobotDataset:
-    return LeRobotDataset("someone/dug", root=folder / "data")
+    return LeRobotDataset("someone/data", root=folder / "data")
 
 
 def rows_of(dataset: LeRobotDataset, episode: int) -> list[dict[str, Any]]:
@@ -117,8 +96,8 @@ def test_a_recording_is_reproduced_bit_for_bit_from_its_session_log(record: Run,
 def test_a_recording_has_the_schema_of_scripted_data(record: Run, tmp_path: Path) -> None:
     record("--dataset.num_episodes=1")
     dataset = dataset_of(tmp_path)
-    expected = dataset_features(height=48, width=64)
-    for key in expected.keys() - excav_features().keys():
+    expected = dataset_features(EXCAVATOR, height=48, width=64)
+    for key in expected.keys() - excav_features(EXCAVATOR).keys():
         recorded = dataset.features[key]
         assert recorded["dtype"] == expected[key]["dtype"], key
         assert tuple(recorded["shape"]) == tuple(expected[key]["shape"]), key
