@@ -4,25 +4,26 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from lerobot_excav.datasets.environment import EnvironmentDescription
+from lerobot_excav.datasets.environments import ENVIRONMENTS, environment_named
 from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.envs.settings import (
-    FIDELITIES,
-    SCENE_SETS,
-    SOILS,
-    TARGETS_PER_SCENE,
-    require_fps,
-    require_image_size,
-    require_task,
-)
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION, UNMARKED_VERSION
+from lerobot_excav.datasets.storage import STORAGES
+from lerobot_excav.datasets.target_rule import TARGET_RULES, targets_of_scene
+from lerobot_excav.envs.settings import SCENE_SETS, TARGETS_PER_SCENE, require_fps, require_image_size
+from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
-ENVS = ("excavator",)
+EXTRA_SETTINGS = tuple(dict.fromkeys(name for known in ENVIRONMENTS.values() for name in known.settings))
+"""Fields that have a meaning in some environments only."""
+_ADDED_LATER = {"target_rule": "round", "storage": "image"}
+"""Fields that stored settings may lack, and what was done before there was a choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DemonstrationSettings:
     """Everything that a demonstration dataset depends on.
+
+    The defaults are the excavator's; `of` makes settings of any environment.
 
     Attributes:
         env: Name of the environment, as in `--env.type`.
@@ -30,14 +31,16 @@ class DemonstrationSettings:
         scene_set: `train`, `val` or `test`.
         first_scene: Number of the first scene.
         scenes: How many scenes.
-        targets: Targets shown per scene: 4 pairs every scene with every target; 1 shows each scene once, going round
-            the targets from scene to scene so that all are equally frequent.
-        seed: Seed of the operator's variations; with scene and target it seeds every episode.
+        targets: Targets shown per scene: 4 pairs every scene with every target, 1 shows each scene once.
+        target_rule: Which target is shown if it is one: `round` goes round the targets from scene to scene so that all
+            are equally frequent, `uniform` draws it, `nearest` takes the one nearest to the gripper at the start.
+        seed: Seed of the operator's variations and of drawn targets; with scene and target it seeds every episode.
         fps: Frames per second.
         height: Image height [px].
         width: Image width [px].
-        soil: Name of the soil preset.
-        fidelity: Numerical effort of the soil.
+        soil: Name of the soil preset; None in an environment without soil.
+        fidelity: Numerical effort of the soil; None in an environment without soil.
+        storage: How pictures are stored: `image` or `video`; see `storage`.
         episode_length: Time limit [frames].
         keep_failures: Whether episodes without success stay in the dataset.
     """
@@ -48,36 +51,93 @@ class DemonstrationSettings:
     first_scene: int = 0
     scenes: int = 50
     targets: int = TARGETS_PER_SCENE
+    target_rule: str = "round"
     seed: int = 0
     fps: int = 10
     height: int = 96
     width: int = 128
-    soil: str = "sand"
-    fidelity: str = "standard"
+    soil: str | None = "sand"
+    fidelity: str | None = "standard"
+    storage: str = "image"
     episode_length: int = 200
     keep_failures: bool = False
 
     def __post_init__(self) -> None:
-        require_choice("--env", self.env, ENVS)
-        require_task("--task", self.task)
+        require_choice("--task", self.task, self.environment.tasks)
         require_choice("--scene-set", self.scene_set, SCENE_SETS)
-        require_choice("--soil", self.soil, SOILS)
-        require_choice("--fidelity", self.fidelity, FIDELITIES)
         require_fps("--fps", self.fps)
         require_image_size("--height", self.height)
         require_image_size("--width", self.width)
+        require_choice("--storage", self.storage, STORAGES)
         require_choice("--targets", self.targets, range(1, TARGETS_PER_SCENE + 1))
         require(self.scenes >= 1, f"--scenes={self.scenes} must be at least 1")
         require(self.first_scene >= 0, f"--first-scene={self.first_scene} must not be negative")
         require(self.seed >= 0, f"--seed={self.seed} must not be negative")
         require(self.episode_length >= 1, f"--episode-length={self.episode_length} must be at least 1 frame")
+        self._require_extra_settings()
+        self._require_target_rule()
+
+    def _require_extra_settings(self) -> None:
+        known = self.environment.settings
+        for name in EXTRA_SETTINGS:
+            option, value = f"--{name}", getattr(self, name)
+            if name in known:
+                require_choice(option, value, known[name].choices)
+            require(
+                name in known or value is None,
+                f"{option}={value!r} has no meaning for --env={self.env}, which has no such setting; leave it out",
+            )
+
+    def _require_target_rule(self) -> None:
+        option = f"--target-rule={self.target_rule}"
+        require_choice("--target-rule", self.target_rule, TARGET_RULES)
+        require(
+            self.targets == 1 or self.target_rule == "round",
+            f"{option} chooses a single target per scene; add --targets=1, or leave it out",
+        )
+        require(
+            self.environment.nearest_target is not None or self.target_rule != "nearest",
+            f"{option} has no meaning for --env={self.env}, which tells no target as the nearest; "
+            "allowed: 'round', 'uniform'",
+        )
+
+    @classmethod
+    def of(cls, env: str, **changes: Any) -> "DemonstrationSettings":
+        """Return the default settings of an environment.
+
+        Args:
+            env: Name of the environment.
+            changes: Fields that differ from the defaults.
+
+        Raises:
+            ConfigurationError: There is no such environment, or a field is not possible in it.
+        """
+        absent: dict[str, Any] = dict.fromkeys(EXTRA_SETTINGS)
+        return cls(**{"env": env, **absent, **environment_named("--env", env).defaults, **changes})
+
+    @property
+    def environment(self) -> EnvironmentDescription:
+        """What is known of the environment."""
+        return environment_named("--env", self.env)
+
+    @property
+    def extra(self) -> dict[str, Any]:
+        """The settings that not every environment has, by name."""
+        return {name: getattr(self, name) for name in self.environment.settings}
 
     def pairs(self) -> list[Pair]:
         """Return the episodes to record, in dataset order."""
         return [
             Pair(self.env, self.scene_set, scene_id, target_id)
             for scene_id in range(self.first_scene, self.first_scene + self.scenes)
-            for target_id in sorted((scene_id + k) % TARGETS_PER_SCENE for k in range(self.targets))
+            for target_id in targets_of_scene(
+                self.target_rule,
+                self.targets,
+                seed=self.seed,
+                scene_set=self.scene_set,
+                scene_id=scene_id,
+                nearest=self.environment.nearest_target,
+            )
         ]
 
     def episode_seed(self, pair: Pair) -> tuple[int, int, int]:
@@ -90,7 +150,7 @@ class DemonstrationSettings:
 
     def as_record(self) -> dict[str, Any]:
         """Return the fields by name, and the version of the simulation that they are played in."""
-        return {"simulation_version": SIMULATION_VERSION, **self.as_dict()}
+        return {"simulation_version": self.environment.simulation_version, **self.as_dict()}
 
     @classmethod
     def from_record(cls, record: dict[str, Any], *, source: Path) -> "DemonstrationSettings":
@@ -103,11 +163,12 @@ class DemonstrationSettings:
         Raises:
             ConfigurationError: It belongs to another version of the simulation, or a field is missing or unknown.
         """
-        values = dict(record)
+        values = {**_ADDED_LATER, **record}
         version = values.pop("simulation_version", UNMARKED_VERSION)
+        current = environment_named(f"env in {source}", record.get("env", "")).simulation_version
         require(
-            version == SIMULATION_VERSION,
-            f"{source} is of version {version} of the simulation, and this is version {SIMULATION_VERSION}; "
+            version == current,
+            f"{source} is of version {version} of the simulation, and this is version {current}; "
             "choose another --out, or install the release of lerobot_env_excav that began it",
         )
         unlike = sorted(set(values) ^ {field.name for field in fields(cls)})

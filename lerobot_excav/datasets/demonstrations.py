@@ -19,7 +19,7 @@ from lerobot_excav.datasets.paired_index import write_index
 from lerobot_excav.datasets.partial_run import PartialRun
 from lerobot_excav.datasets.progress import EpisodeProgress
 from lerobot_excav.datasets.provenance import read_provenance, write_provenance
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.rig import Rig
 from lerobot_excav.datasets.simulation import simulate_episode
 from lerobot_excav.datasets.workers import episode_result, require_workers, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
@@ -62,7 +62,7 @@ def record_demonstrations(
         out: Folder of the dataset.
         workers: Worker processes; 0 works in this process.
         resume: Whether to continue an interrupted run.
-        rig: Environment and operator; the excavator by default.
+        rig: Environment and operator; those of the settings by default.
         show_progress: Whether to draw a progress bar.
 
     Returns:
@@ -78,9 +78,8 @@ def record_demonstrations(
         outcomes = _require_finished(out, settings, resume=resume)
     else:
         with PartialRun(out, settings, resume=resume) as partial:
-            outcomes = _fill(
-                partial, settings, workers=workers, rig=rig or ExcavatorRig(), show_progress=show_progress
-            )
+            rig = rig or settings.environment.rig()
+            outcomes = _fill(partial, settings, workers=workers, rig=rig, show_progress=show_progress)
             partial.dataset.rename(out)
     PartialRun.remove(out)
     return DemonstrationSummary(
@@ -110,9 +109,7 @@ def _fill(
         # LeRobot takes seconds to load; by now the workers are at work.
         from lerobot_excav.datasets.assembly import append_episode, create_dataset
 
-        dataset = create_dataset(
-            partial.dataset, fps=settings.fps, height=settings.height, width=settings.width
-        )
+        dataset = create_dataset(partial.dataset, settings)
         outcomes = []
         for pair, future in futures.items():
             outcome = episode_result(pair, future)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.envs.features import CAMERAS
 
 
 class Environment(Protocol):
-    """What an episode needs of an environment (`ExcavatorEnv` has it)."""
+    """What an episode needs of an environment."""
 
     task_description: str
 
@@ -29,13 +28,13 @@ class Environment(Protocol):
 
 
 class Operator(Protocol):
-    """What an episode needs of an operator (`ScriptedOperator` has it)."""
+    """What an episode needs of an operator."""
 
     def reset(self, env: Any) -> None:
         """Look at a freshly reset environment."""
 
     def act(self, env: Any) -> NDArray[Any]:
-        """Return the next action, float32 (4,)."""
+        """Return the next action, float32 (a,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +45,9 @@ class Episode:
         pair: Scene and target.
         task: Task description.
         images: By camera, (n, H, W, 3) uint8; empty when the environment shows none.
-        state: Joint positions and velocities [rad, rad/s], (n, 8) float32.
-        action: Joystick commands in [-1, 1], (n, 4) float32.
-        task_state: See `TASK_STATE_NAMES`, (n, 8) float32.
+        state: What the policy feels of the machine, (n, s) float32; names and units as its environment has them.
+        action: What it was told, (n, a) float32.
+        task_state: How far the task is, (n, k) float32.
         success: Outcome of the episode.
         metrics: Outcome part by part, after the last action.
     """
@@ -84,7 +83,7 @@ def replay(env: Environment, action: NDArray[Any], pair: Pair) -> Episode:
 
     Args:
         env: Environment; it is reset to the pair's scene and target.
-        action: Actions, (n, 4) float32.
+        action: Actions, (n, a) float32.
         pair: Scene and target.
 
     Returns:
@@ -115,10 +114,11 @@ def _play(
         success = success or bool(info["is_success"])
         metrics = info.get("episode_metrics", metrics)
     columns = {key: np.stack([frame[key] for frame in frames]) for key in frames[0]}
+    cameras = observation.get("pixels", {})
     return Episode(
         pair=pair,
         task=env.task_description,
-        images={camera: columns.pop(camera) for camera in CAMERAS if camera in columns},
+        images={camera: columns.pop(camera) for camera in cameras},
         success=success,
         metrics=dict(metrics),
         **columns,

@@ -36,8 +36,15 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
     ):
         if not np.isfinite(values).all():
             yield f"{name} is not finite at frame {int(np.argmin(np.isfinite(values).all(axis=1)))}"
-    if np.nanmax(np.abs(episode.action)) > 1.0:
-        yield f"an action reaches {np.nanmax(np.abs(episode.action)):.3g}; allowed are -1 to 1"
+    names = episode.environment.action_names
+    for name, values, low, high in zip(
+        names, episode.action.T, *episode.environment.action_limits, strict=True
+    ):
+        # Compared as they are stored: a limit may be rounded up.
+        outside = values[(values < np.float32(low)) | (values > np.float32(high))]
+        if outside.size:
+            worst = outside[np.argmax(np.abs(outside))]
+            yield f"action {name} reaches {worst:.3g}; allowed are {low:.3g} to {high:.3g}"
 
 
 def _mask_problems(episode: EpisodeTable) -> Iterator[str]:

@@ -3,10 +3,9 @@
 LeRobot's own reader first copies all pictures into a cache; what the index and the checks need is a small part of them.
 """
 
-import io
 import json
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,22 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from PIL import Image
 
+from lerobot_excav.datasets.environment import EnvironmentDescription
+from lerobot_excav.datasets.environments import environment_of_robot
 from lerobot_excav.datasets.pair import Pair
+from lerobot_excav.datasets.pictures import Pictures, StoredImages, VideoSpan
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
-    FIDELITY_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
-    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
-    UNMARKED,
+    setting_key,
+    unmarked_columns,
 )
 from lerobot_excav.errors import DatasetError
 
@@ -43,12 +43,16 @@ class EpisodeTable:
     Attributes:
         index: Episode index.
         length: Number of frames.
-        columns: The columns asked for, by key; pictures are undecoded.
+        environment: Where it comes from.
+        columns: The columns asked for, by key, without pictures.
+        pictures: The pictures asked for, by key, undecoded.
     """
 
     index: int
     length: int
+    environment: EnvironmentDescription
     columns: dict[str, pa.ChunkedArray]
+    pictures: dict[str, Pictures]
 
     def array(self, key: str) -> NDArray[Any]:
         """Return a numeric column, shape (n, k) or (n,)."""
@@ -56,17 +60,17 @@ class EpisodeTable:
 
     @property
     def state(self) -> NDArray[Any]:
-        """Joint positions and velocities, (n, 8)."""
+        """What was felt of the machine, (n, s)."""
         return self.array(STATE_KEY)
 
     @property
     def action(self) -> NDArray[Any]:
-        """Joystick commands, (n, 4)."""
+        """What the machine was told, (n, a)."""
         return self.array(ACTION_KEY)
 
     @property
     def task_state(self) -> NDArray[Any]:
-        """Task state, (n, 8)."""
+        """Task state, (n, k)."""
         return self.array(TASK_STATE_KEY)
 
     @property
@@ -80,14 +84,9 @@ class EpisodeTable:
         return int(self._constant(SIMULATION_KEY))
 
     @property
-    def soil(self) -> str:
-        """Name of the soil preset."""
-        return str(self._constant(SOIL_KEY))
-
-    @property
-    def fidelity(self) -> str:
-        """Numerical effort of the soil."""
-        return str(self._constant(FIDELITY_KEY))
+    def settings(self) -> dict[str, str]:
+        """Settings that not every environment has, such as the soil, by name."""
+        return {name: str(self._constant(setting_key(name))) for name in self.environment.settings}
 
     @property
     def pair(self) -> Pair:
@@ -110,15 +109,16 @@ class EpisodeTable:
             key: pa.chunked_array([pa.array(column[:1].to_pylist(), column.type)])
             for key, column in self.columns.items()
         }
-        return EpisodeTable(index=self.index, length=1, columns=first)
+        pictures = {key: pictures.first() for key, pictures in self.pictures.items()}
+        return replace(self, length=1, columns=first, pictures=pictures)
 
     def image(self, key: str, frame: int) -> NDArray[Any]:
         """Return a decoded picture, (H, W, 3) uint8."""
-        return np.asarray(Image.open(io.BytesIO(self.columns[key][frame]["bytes"].as_py())).convert("RGB"))
+        return self.pictures[key].frame(frame)
 
     def distinct_images(self, key: str) -> int:
-        """Count pictures that differ in their file bytes; equal pictures of one writer have equal bytes."""
-        return len({value["bytes"].as_py() for value in self.columns[key]})
+        """Count different pictures."""
+        return self.pictures[key].distinct()
 
     def _constant(self, key: str) -> Any:
         values = pc.unique(self.columns[key]).to_pylist()
@@ -137,11 +137,24 @@ class DatasetInfo:
         fps: Frames per second.
         total_episodes: Number of episodes.
         features: Feature descriptions by key.
+        robot_type: Which robot it is of.
+        video_path: Pattern of the paths of its videos; None if it has none.
     """
 
     fps: int
     total_episodes: int
     features: dict[str, Any]
+    robot_type: str | None
+    video_path: str | None
+
+    @property
+    def environment(self) -> EnvironmentDescription:
+        """The environment that the dataset comes from.
+
+        Raises:
+            DatasetError: It comes from elsewhere.
+        """
+        return environment_of_robot(self.robot_type)
 
 
 def read_info(root: Path) -> DatasetInfo:
@@ -158,7 +171,13 @@ def read_info(root: Path) -> DatasetInfo:
         raise DatasetError(
             f"{root} has the format {info['codebase_version']}; this needs {CODEBASE_VERSION}, so convert it"
         )
-    return DatasetInfo(fps=info["fps"], total_episodes=info["total_episodes"], features=info["features"])
+    return DatasetInfo(
+        fps=info["fps"],
+        total_episodes=info["total_episodes"],
+        features=info["features"],
+        robot_type=info["robot_type"],
+        video_path=info.get("video_path"),
+    )
 
 
 def iterate_episodes(
@@ -168,34 +187,69 @@ def iterate_episodes(
 
     Args:
         root: The dataset.
-        keys: Columns to read. Those of `schema.UNMARKED` that a dataset lacks are filled in.
+        keys: Columns to read. Those of `schema.unmarked_columns` that a dataset lacks are filled in.
         episodes: Episode indices; all by default.
 
     Yields:
         One table per episode, frames in order.
     """
-    wanted = set(range(read_info(root).total_episodes) if episodes is None else episodes)
+    info = read_info(root)
+    wanted = set(range(info.total_episodes) if episodes is None else episodes)
+    stored = {kind: [key for key in keys if _dtype(info, key) == kind] for kind in ("image", "video")}
+    spans = _video_spans(root, info, stored["video"])
+    columns = [key for key in keys if key not in stored["video"]]
     for path in sorted(root.glob("data/*/*.parquet")):
-        yield from _episodes_of_file(path, keys, wanted)
+        for index, rows in _episodes_of_file(path, columns, wanted, info.environment):
+            yield EpisodeTable(
+                index=index,
+                length=rows.num_rows,
+                environment=info.environment,
+                columns={key: rows[key] for key in columns if key not in stored["image"]},
+                pictures={
+                    **{key: StoredImages(rows[key]) for key in stored["image"]},
+                    **spans.get(index, {}),
+                },
+            )
 
 
-def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iterator[EpisodeTable]:
+def _dtype(info: DatasetInfo, key: str) -> str:
+    return str(info.features.get(key, {}).get("dtype", ""))
+
+
+def _video_spans(root: Path, info: DatasetInfo, keys: Sequence[str]) -> dict[int, dict[str, VideoSpan]]:
+    """Find where the videos of every episode lie."""
+    if not keys or info.video_path is None:
+        return {}
+    parts = ("chunk_index", "file_index", "from_timestamp")
+    columns = ["episode_index", "length", *(f"videos/{key}/{part}" for key in keys for part in parts)]
+    spans: dict[int, dict[str, VideoSpan]] = {}
+    for path in sorted(root.glob("meta/episodes/*/*.parquet")):
+        for row in pq.read_table(path, columns=columns).to_pylist():
+            for key in keys:
+                chunk, file, start_s = (row[f"videos/{key}/{part}"] for part in parts)
+                place = info.video_path.format(video_key=key, chunk_index=chunk, file_index=file)
+                span = VideoSpan(path=root / place, start_s=start_s, fps=info.fps, length=row["length"])
+                spans.setdefault(row["episode_index"], {})[key] = span
+    return spans
+
+
+def _episodes_of_file(
+    path: Path, keys: Sequence[str], wanted: set[int], environment: EnvironmentDescription
+) -> Iterator[tuple[int, pa.Table]]:
     parquet = pq.ParquetFile(path)
     columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
     for group in range(parquet.num_row_groups):
         # LeRobot writes one row group per episode; a file written by something else just costs more memory.
-        table = _marked(parquet.read_row_group(group, columns=columns), columns)
+        table = _marked(parquet.read_row_group(group, columns=columns), columns, environment)
         for index in pc.unique(table["episode_index"]).to_pylist():
             if index in wanted:
                 rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
-                yield EpisodeTable(
-                    index=index, length=rows.num_rows, columns={key: rows[key] for key in keys}
-                )
+                yield index, rows
 
 
-def _marked(table: pa.Table, columns: Sequence[str]) -> pa.Table:
+def _marked(table: pa.Table, columns: Sequence[str], environment: EnvironmentDescription) -> pa.Table:
     """Fill in columns that were asked for and that the first version of the simulation did not write."""
-    for key, value in UNMARKED.items():
+    for key, value in unmarked_columns(environment).items():
         if key in columns and key not in table.column_names:
             table = table.append_column(key, pa.array([value] * table.num_rows))
     return table

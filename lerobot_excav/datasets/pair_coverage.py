@@ -7,8 +7,22 @@ import pandas as pd
 SCENE_COLUMNS = ["env", "scene_set", "scene_id"]
 """What numbers a scene."""
 
-PILE_COLUMNS = [*SCENE_COLUMNS, "soil"]
-"""What determines a starting situation: the same scene is another pile on another soil."""
+START_SETTINGS = ("soil",)
+"""Settings, where there are such, that make the same scene another start: another soil is another pile."""
+
+
+def start_columns(index: pd.DataFrame) -> list[str]:
+    """Return the columns that determine a starting situation: the same scene is another pile on another soil."""
+    return [*SCENE_COLUMNS, *_settings(index)]
+
+
+def pair_columns(index: pd.DataFrame) -> list[str]:
+    """Return the columns that name a start shown with a target."""
+    return ["pair_uid", *_settings(index)]
+
+
+def _settings(index: pd.DataFrame) -> list[str]:
+    return [name for name in START_SETTINGS if name in index]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,19 +57,26 @@ def pair_coverage(index: pd.DataFrame) -> PairCoverage:
         Counts, missing targets and duplicates.
     """
     targets = set(index["target_id"])
-    on_soil = " on {}" if index["soil"].nunique() > 1 else ""
-    scenes = {
-        f"{env}/{scene_set}/{scene_id}{on_soil.format(soil)}": set(rows["target_id"])
-        for (env, scene_set, scene_id, soil), rows in index.groupby(PILE_COLUMNS)
-    }
+    varied = [name for name in _settings(index) if index[name].nunique() > 1]
+    named = index.assign(
+        scene=_joined(index, SCENE_COLUMNS, "/") + _suffix(index, varied),
+        pair=index["pair_uid"] + _suffix(index, varied),
+    )
+    scenes = {str(scene): set(rows["target_id"]) for scene, rows in named.groupby("scene")}
     missing = {scene: sorted(targets - shown) for scene, shown in scenes.items() if shown != targets}
-    pair = ["pair_uid", "soil"]
-    repeated = index[index.duplicated(pair, keep=False)].groupby(pair)["episode_index"]
+    repeated = named[named.duplicated("pair", keep=False)].groupby("pair")["episode_index"]
     return PairCoverage(
         scenes=len(scenes),
         targets=len(targets),
         missing=missing,
-        duplicates={
-            f"{uid}{on_soil.format(soil)}": [int(i) for i in episodes] for (uid, soil), episodes in repeated
-        },
+        duplicates={str(pair): [int(i) for i in episodes] for pair, episodes in repeated},
     )
+
+
+def _suffix(index: pd.DataFrame, varied: list[str]) -> pd.Series:
+    """Name the settings that tell starts apart."""
+    return " on " + _joined(index, varied, ", ") if varied else pd.Series("", index=index.index)
+
+
+def _joined(index: pd.DataFrame, columns: list[str], separator: str) -> pd.Series:
+    return index[columns].astype(str).agg(separator.join, axis=1)

@@ -13,39 +13,41 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.environment import EnvironmentDescription
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
-    FIDELITY_KEY,
     MASK_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
-    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
     require_columns,
+    setting_key,
 )
-from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
-INDEX_KEYS = (
-    STATE_KEY,
-    ACTION_KEY,
-    MASK_KEY,
-    SCENE_KEY,
-    TARGET_KEY,
-    PAIR_KEY,
-    TASK_STATE_KEY,
-    SUCCESS_KEY,
-    SIMULATION_KEY,
-    SOIL_KEY,
-    FIDELITY_KEY,
-)
 
 UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
+
+
+def index_keys(environment: EnvironmentDescription) -> list[str]:
+    """Return the columns of a dataset that its index is derived from."""
+    return [
+        STATE_KEY,
+        ACTION_KEY,
+        MASK_KEY,
+        SCENE_KEY,
+        TARGET_KEY,
+        PAIR_KEY,
+        TASK_STATE_KEY,
+        SUCCESS_KEY,
+        SIMULATION_KEY,
+        *(setting_key(name) for name in environment.settings),
+    ]
 
 
 def build_index(root: Path) -> pd.DataFrame:
@@ -61,8 +63,9 @@ def build_index(root: Path) -> pd.DataFrame:
     Raises:
         DatasetError: A column is missing, or contradicts another.
     """
-    require_columns(read_info(root).features)
-    rows = [_row(episode) for episode in iterate_episodes(root, INDEX_KEYS)]
+    info = read_info(root)
+    require_columns(info.environment, info.features)
+    rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.environment))]
     index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
     return _with_verdicts(index, _stored(root))
 
@@ -84,24 +87,16 @@ def store_index(root: Path, index: pd.DataFrame) -> None:
 
 def _row(episode: EpisodeTable) -> dict[str, Any]:
     pair = episode.pair
-    first, last = episode.task_state[0], episode.task_state[-1]
-    last_value = dict(zip(TASK_STATE_NAMES, last.tolist(), strict=True))
-    deposited = TASK_STATE_NAMES.index("deposited_mass_kg")
     return {
         "pair_uid": pair.uid,
         "episode_index": episode.index,
         **pair._asdict(),
         "simulation_version": episode.simulation_version,
-        "soil": episode.soil,
-        "fidelity": episode.fidelity,
+        **episode.settings,
         "length": episode.length,
         "success": episode.success,
         **_mask_summary(episode.image(MASK_KEY, 0)),
-        "retained_mass_kg": float(last[deposited] - first[deposited]),
-        "residual_bucket_mass_kg": last_value["bucket_mass_kg"],
-        "excavated_mass_kg": last_value["excavated_mass_kg"],
-        "hard_target_contacts": round(last_value["hard_target_contacts"]),
-        "spill_before_target_events": round(last_value["spill_before_target_events"]),
+        **episode.environment.outcome(episode.task_state),
         "fingerprint": fingerprint(episode),
     }
 

@@ -3,16 +3,17 @@
 from collections import defaultdict
 from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from lerobot_excav.datasets.episode_check import MAIN_KEY, episode_problems, scene_problems
 from lerobot_excav.datasets.episode_table import EpisodeTable, iterate_episodes, read_info
-from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.datasets.paired_index import FAILED, INDEX_KEYS, PASSED, build_index, store_index
+from lerobot_excav.datasets.pair_coverage import START_SETTINGS
+from lerobot_excav.datasets.paired_index import FAILED, PASSED, build_index, index_keys, store_index
 from lerobot_excav.datasets.replay_check import replay_problem
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.rig import Rig
 from lerobot_excav.datasets.schema import require_columns
 from lerobot_excav.datasets.version_check import require_this_simulation, versions_of
 from lerobot_excav.errors import require
@@ -33,7 +34,7 @@ def check_dataset(
         episodes: Episodes to check; all by default.
         replays: How many of them to replay, chosen at random.
         seed: Seed of that choice.
-        rig: Makes the environment of the replays; the excavator by default.
+        rig: Makes the environment of the replays; that of the dataset by default.
 
     Returns:
         The checked rows of the index, with `qc` (`passed` or `failed`), `qc_problem` and `replayed`.
@@ -44,7 +45,8 @@ def check_dataset(
         ConfigurationError: An episode that does not exist, or a negative number of replays.
     """
     info = read_info(root)
-    require_columns(info.features)
+    environment = info.environment
+    require_columns(environment, info.features)
     wanted = sorted(range(info.total_episodes) if episodes is None else set(episodes))
     unknown = [index for index in wanted if not 0 <= index < info.total_episodes]
     require(
@@ -54,16 +56,19 @@ def check_dataset(
     require(replays >= 0, f"--replays={replays} must not be negative")
 
     index = build_index(root)
-    problems = _static_problems(root, wanted)
+    problems = _static_problems(root, wanted, index_keys(environment))
     sound = [number for number in wanted if not problems[number]]
     sample = np.random.default_rng(seed).permutation(sound)[:replays].tolist()
     if sample:
         versions = versions_of(index)
         require_this_simulation(
-            {i: versions[i] for i in wanted}, source=root, instead="; --replays=0 checks all but replays"
+            environment,
+            {i: versions[i] for i in wanted},
+            source=root,
+            instead="; --replays=0 checks all but replays",
         )
-        rig = rig or ExcavatorRig(with_images=False)
-        for recorded in iterate_episodes(root, INDEX_KEYS, episodes=sample):
+        rig = rig or environment.rig(with_images=False)
+        for recorded in iterate_episodes(root, index_keys(environment), episodes=sample):
             problem = replay_problem(rig, recorded, fps=info.fps)
             problems[recorded.index] = [problem] if problem else []
 
@@ -75,15 +80,20 @@ def check_dataset(
     return index[checked].assign(replayed=index["episode_index"].isin(sample))
 
 
-def _static_problems(root: Path, wanted: list[int]) -> dict[int, list[str]]:
+def _static_problems(root: Path, wanted: list[int], keys: list[str]) -> dict[int, list[str]]:
     problems: dict[int, list[str]] = {}
-    scenes: dict[tuple[int, str, Pair], list[EpisodeTable]] = defaultdict(list)
-    for episode in iterate_episodes(root, (*INDEX_KEYS, MAIN_KEY, "frame_index"), episodes=wanted):
+    scenes: dict[tuple[Any, ...], list[EpisodeTable]] = defaultdict(list)
+    for episode in iterate_episodes(root, (*keys, MAIN_KEY, "frame_index"), episodes=wanted):
         problems[episode.index] = episode_problems(episode)
         if not problems[episode.index]:
-            scene = (episode.simulation_version, episode.soil, episode.pair._replace(target_id=0))
-            scenes[scene].append(episode.first_frame())
+            start = (episode.simulation_version, episode.pair._replace(target_id=0), *_start(episode))
+            scenes[start].append(episode.first_frame())
     for starts in scenes.values():
         for number, problem in scene_problems(starts).items():
             problems[number].append(problem)
     return problems
+
+
+def _start(episode: EpisodeTable) -> list[str]:
+    """Return the settings, besides the scene, that determine how an episode starts; fidelity does not."""
+    return [value for name, value in episode.settings.items() if name in START_SETTINGS]

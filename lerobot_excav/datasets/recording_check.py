@@ -26,21 +26,28 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
         DatasetError: It is not so.
     """
     info = read_info(root)
-    present = [key for key in excav_features() if key in info.features]
+    environment = info.environment
+    added = excav_features(environment)
+    present = [key for key in added if key in info.features]
     if present:
         raise DatasetError(
             f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
         )
-    require_columns(info.features | excav_features())
+    require_columns(environment, info.features | added)
     missing = [index for index in range(info.total_episodes) if index not in session]
     if missing:
         raise DatasetError(
             f"the session has no line for episodes {missing}; is it the session of this recording?"
         )
     versions = {index: session[index].simulation_version for index in range(info.total_episodes)}
-    require_this_simulation(versions, source=root, instead="")
+    require_this_simulation(environment, versions, source=root, instead="")
     for index in range(info.total_episodes):
         episode = session[index]
+        if episode.env != environment.name:
+            raise DatasetError(
+                f"episode {index}: the session is of {episode.env}, the recording of {environment.name}; "
+                "is it the session of this recording?"
+            )
         if episode.fps != info.fps:
             raise DatasetError(
                 f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {info.fps}; "

@@ -7,7 +7,6 @@ from lerobot_excav.datasets.episode import replay
 from lerobot_excav.datasets.episode_table import EpisodeTable
 from lerobot_excav.datasets.resimulation import STATE_TOLERANCE
 from lerobot_excav.datasets.rig import Rig
-from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
 
 TASK_STATE_TOLERANCE = 1e-2
 """Allowed deviation of a task state, in its own unit (guess; the same build repeats exactly)."""
@@ -25,13 +24,12 @@ def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int) -> str:
         The first deviation beyond tolerance, or an empty string.
     """
     pair = recorded.pair
-    settings = DemonstrationSettings(
-        env=pair.env,
+    settings = DemonstrationSettings.of(
+        pair.env,
         scene_set=pair.scene_set,
         fps=fps,
-        soil=recorded.soil,
-        fidelity=recorded.fidelity,
-        episode_length=recorded.length + 1,
+        episode_length=recorded.environment.replay_length(recorded.length),
+        **recorded.settings,
     )
     env = rig.environment(settings)
     try:
@@ -44,7 +42,7 @@ def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int) -> str:
         return f"replay leaves the recorded state at frame {frame} (up to {state.max():.3g} rad)"
     task = np.abs(played.task_state - recorded.task_state)
     if task.max() > TASK_STATE_TOLERANCE:
-        name = TASK_STATE_NAMES[int(np.argmax(task.max(axis=0)))]
+        name = recorded.environment.task_state_names[int(np.argmax(task.max(axis=0)))]
         return f"replay gives another {name} (by up to {task.max():.3g})"
     if played.success != recorded.success:
         return f"replay ends with success={played.success}, recorded {recorded.success}"

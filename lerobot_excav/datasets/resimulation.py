@@ -24,22 +24,20 @@ from lerobot_excav.datasets.recording_check import (
     require_recorded_targets,
     whole_episodes,
 )
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.rig import Rig
 from lerobot_excav.datasets.schema import (
     ACTION_KEY,
-    FIDELITY_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
-    SOIL_KEY,
     STATE_KEY,
     SUCCESS_KEY,
     TARGET_KEY,
     TASK_STATE_KEY,
     excav_features,
+    setting_key,
 )
 from lerobot_excav.datasets.session import SessionEpisode, read_session
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
 STATE_TOLERANCE = 1e-4
@@ -61,7 +59,7 @@ def complete_recording(
         session_path: Session log of the simulated robot.
         out: Where to put the completed dataset; it replaces `root` by default.
         skip_restarted: Whether to leave out episodes in which the scene was restarted, instead of refusing them.
-        rig: Makes the environment; the excavator by default.
+        rig: Makes the environment; that of the recording by default.
 
     Returns:
         Folder of the completed dataset.
@@ -73,6 +71,7 @@ def complete_recording(
         raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
     session = read_session(session_path)
     require_completable(root, session)
+    environment = read_info(root).environment
     whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
     # Beside the destination, so that the last step is a rename.
     temporary = (out or root).with_name(f".{root.name}.{uuid.uuid4().hex[:8]}")
@@ -80,8 +79,8 @@ def complete_recording(
         with _reduced(root, whole, temporary.with_name(f"{temporary.name}.whole")) as reduced:
             # Leaving episodes out renumbers the others.
             renumbered = {number: session[index] for number, index in enumerate(whole)}
-            require_recorded_targets(reduced, renumbered, rig or ExcavatorRig())
-            episodes = _resimulate_all(reduced, renumbered, rig or ExcavatorRig(with_images=False))
+            require_recorded_targets(reduced, renumbered, rig or environment.rig())
+            episodes = _resimulate_all(reduced, renumbered, rig or environment.rig(with_images=False))
             _write_completed(reduced, episodes, renumbered, temporary)
         write_index(temporary)
         return _put_in_place(temporary, root, out)
@@ -112,7 +111,8 @@ def _resimulate_all(root: Path, session: dict[int, SessionEpisode], rig: Rig) ->
 
 
 def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Episode:
-    env = rig.environment(session.settings())
+    limit = recorded.environment.replay_length(recorded.length)
+    env = rig.environment(session.settings(episode_length=limit))
     try:
         played = replay(env, recorded.action, session.pair)
     finally:
@@ -132,9 +132,11 @@ def _write_completed(
     root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path
 ) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
+    environment = read_info(root).environment
+    columns = excav_features(environment)
 
     def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
-        return lambda row, episode, frame: values[int(episode)], excav_features()[key]
+        return lambda row, episode, frame: values[int(episode)], columns[key]
 
     def task_state(row: dict[str, Any], episode: int, frame: int) -> NDArray[Any]:
         values: NDArray[Any] = episodes[int(episode)].task_state[int(frame)]
@@ -144,11 +146,13 @@ def _write_completed(
         SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),
         TARGET_KEY: constant(TARGET_KEY, {i: e.pair.target_id for i, e in episodes.items()}),
         PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
-        TASK_STATE_KEY: (task_state, excav_features()[TASK_STATE_KEY]),
+        TASK_STATE_KEY: (task_state, columns[TASK_STATE_KEY]),
         SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
-        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, SIMULATION_VERSION)),
-        SOIL_KEY: constant(SOIL_KEY, {i: session[i].soil for i in episodes}),
-        FIDELITY_KEY: constant(FIDELITY_KEY, {i: session[i].fidelity for i in episodes}),
+        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, environment.simulation_version)),
+        **{
+            setting_key(name): constant(setting_key(name), {i: session[i].extra[name] for i in episodes})
+            for name in environment.settings
+        },
     }
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)

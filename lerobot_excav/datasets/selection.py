@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from lerobot_excav.datasets.pair_coverage import PILE_COLUMNS
+from lerobot_excav.datasets.pair_coverage import pair_columns, start_columns
 from lerobot_excav.datasets.paired_index import FAILED
 from lerobot_excav.errors import DatasetError, require, require_choice
 
@@ -23,7 +23,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
     rows = index[index["qc"] != FAILED]
     if not include_failures:
         rows = rows[rows["success"]]
-    return rows.sort_values("episode_index").drop_duplicates(["pair_uid", "soil"])
+    return rows.sort_values("episode_index").drop_duplicates(pair_columns(index))
 
 
 def select(
@@ -84,8 +84,9 @@ def select(
 
 def _shuffle_scenes(index: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     """Order rows by a random order of the scenes, then by target; adds the column `scene_rank`."""
-    ordered = index.sort_values([*PILE_COLUMNS, "target_id"])
-    number = ordered.groupby(PILE_COLUMNS).ngroup().to_numpy()
+    start = start_columns(index)
+    ordered = index.sort_values([*start, "target_id"])
+    number = ordered.groupby(start).ngroup().to_numpy()
     rank = rng.permutation(number.max() + 1)
     return ordered.assign(scene_rank=rank[number]).sort_values(["scene_rank", "target_id"])
 

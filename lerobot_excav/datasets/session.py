@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.environments import environment_named
 from lerobot_excav.datasets.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
@@ -22,49 +23,53 @@ class SessionEpisode:
     Attributes:
         simulation_version: Version of the simulation.
         episode_index: Its number when it was recorded.
+        env: Name of the environment.
         scene_set: Scene set.
         scene_id: Scene.
         target_id: Target.
         fps: Frames per second.
-        soil: Name of the soil preset.
-        fidelity: Numerical effort of the soil.
         observation_height: Image height [px].
         observation_width: Image width [px].
         task: Task of the environment.
         frames: How many actions were carried out; None if the line does not say.
+        extra: Settings that not every environment has, by name.
         restarts: Frames after which the scene was restarted within the episode.
     """
 
     simulation_version: int
     episode_index: int
+    env: str
     scene_set: str
     scene_id: int
     target_id: int
     fps: int
-    soil: str
-    fidelity: str
     observation_height: int
     observation_width: int
     task: str
+    extra: dict[str, str]
     frames: int | None = None
     restarts: tuple[int, ...] = ()
 
     @property
     def pair(self) -> Pair:
         """Scene and target."""
-        return Pair("excavator", self.scene_set, self.scene_id, self.target_id)
+        return Pair(self.env, self.scene_set, self.scene_id, self.target_id)
 
-    def settings(self) -> DemonstrationSettings:
-        """Return the settings of an environment that behaves as the robot did."""
-        return DemonstrationSettings(
+    def settings(self, *, episode_length: int = _ENDLESS_FRAMES) -> DemonstrationSettings:
+        """Return the settings of an environment that behaves as the robot did.
+
+        Args:
+            episode_length: Time limit [frames]; none by default.
+        """
+        return DemonstrationSettings.of(
+            self.env,
             task=self.task,
             scene_set=self.scene_set,
             fps=self.fps,
             height=self.observation_height,
             width=self.observation_width,
-            soil=self.soil,
-            fidelity=self.fidelity,
-            episode_length=_ENDLESS_FRAMES,
+            episode_length=episode_length,
+            **self.extra,
         )
 
 
@@ -87,14 +92,23 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
 
 
 def _episode(line: Line) -> SessionEpisode:
-    # The first version wrote neither its number nor the fidelity, of which it had one only.
-    record = {"simulation_version": UNMARKED_VERSION, **line.record}
+    # The first version wrote neither its number nor the fidelity, of which it had one only; and only the other
+    # environments name themselves.
+    record = {"simulation_version": UNMARKED_VERSION, "env": "excavator", **line.record}
     if record["simulation_version"] == UNMARKED_VERSION:
         record.setdefault("fidelity", "standard")
-    values = {field.name: record[field.name] for field in fields(SessionEpisode) if field.name in record}
-    missing = {field.name for field in fields(SessionEpisode)} - {"frames", "restarts"} - set(values)
+    known = environment_named(f"{line.place}: env", record["env"]).settings
+    required = ({field.name for field in fields(SessionEpisode)} - {"frames", "restarts", "extra"}) | set(
+        known
+    )
+    missing = required - set(record)
     if missing:
         raise DatasetError(
-            f"{line.place}: lacks {', '.join(sorted(missing))}; is it a session log of excavator_sim?"
+            f"{line.place}: lacks {', '.join(sorted(missing))}; is it a session log of a simulated robot?"
         )
-    return SessionEpisode(**{**values, "restarts": tuple(values.get("restarts", ()))})
+    return SessionEpisode(
+        **{name: record[name] for name in required - set(known)},
+        extra={name: record[name] for name in known},
+        frames=record.get("frames"),
+        restarts=tuple(record.get("restarts", ())),
+    )

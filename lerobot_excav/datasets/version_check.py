@@ -6,14 +6,17 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION
+from lerobot_excav.datasets.environment import EnvironmentDescription
 from lerobot_excav.errors import DatasetError
 
 
-def require_this_simulation(versions: Mapping[int, int], *, source: Path, instead: str) -> None:
+def require_this_simulation(
+    environment: EnvironmentDescription, versions: Mapping[int, int], *, source: Path, instead: str
+) -> None:
     """Check that episodes can be replayed by this version of the simulation.
 
     Args:
+        environment: Where the episodes come from.
         versions: Version of the simulation by episode index.
         source: The dataset, or the file that names the versions.
         instead: What can be done without a replay, for the message.
@@ -21,13 +24,14 @@ def require_this_simulation(versions: Mapping[int, int], *, source: Path, instea
     Raises:
         DatasetError: An episode is of another version.
     """
+    current = environment.simulation_version
     for version, episodes in sorted(episodes_by_version(versions).items()):
-        if version != SIMULATION_VERSION:
-            newer = max(version, SIMULATION_VERSION)
-            changes = CHANGES.get(newer, "unknown to this older package")
+        if version != current:
+            newer = max(version, current)
+            changes = environment.changes.get(newer, "unknown to this older package")
             raise DatasetError(
                 f"{source}: {describe_episodes(episodes)} of version {version} of the simulation cannot be replayed "
-                f"in version {SIMULATION_VERSION}, which this is (version {newer}: {changes}). Record again, or "
+                f"in version {current}, which this is (version {newer}: {changes}). Record again, or "
                 f"install the release of lerobot_env_excav that recorded them{instead}"
             )
 

@@ -7,11 +7,10 @@ from typing import Any
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.progress import EpisodeProgress
-from lerobot_excav.datasets.rig import ExcavatorRig, Rig
+from lerobot_excav.datasets.rig import Rig
 from lerobot_excav.datasets.simulation import play_demonstration
 from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.envs.metrics_log import json_line
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
@@ -33,7 +32,7 @@ def evaluate_operator(
         path: Metrics file; its folder is made.
         workers: Worker processes; 0 works in this process.
         resume: Whether to continue an interrupted run.
-        rig: Environment and operator; the excavator by default.
+        rig: Environment and operator; those of the settings by default.
         show_progress: Whether to draw a progress bar.
 
     Raises:
@@ -57,7 +56,7 @@ def evaluate_operator(
         pairs,
         len(lines),
         workers,
-        rig or ExcavatorRig(with_images=False),
+        rig or settings.environment.rig(with_images=False),
         show=show_progress,
     )
     partial.rename(path)
@@ -104,13 +103,12 @@ def _expected(settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
     """Return the part of an episode's line that is known before it is played."""
     return {
         **_operator(settings),
-        "simulation_version": SIMULATION_VERSION,
+        "simulation_version": settings.environment.simulation_version,
         "task": settings.task,
         "scene_set": pair.scene_set,
         "scene_id": pair.scene_id,
         "target_id": pair.target_id,
-        "soil": settings.soil,
-        "fidelity": settings.fidelity,
+        **settings.extra,
         "fps": settings.fps,
         "episode_length": settings.episode_length,
     }

@@ -9,6 +9,8 @@ Examples:
       50 scenes, each with its 4 targets: 200 paired episodes
   lerobot-excav demos --scenes=200 --targets=1 --out=outputs/non_paired
       as many episodes, each of another scene
+  lerobot-excav demos --env=fr5_grasp --scenes=200 --targets=1 --target-rule=nearest --out=outputs/nearest
+      the arm, sent to the block nearest to it in each of 200 scenes
   lerobot-excav demos --scenes=50 --out=outputs/paired --resume
       go on after an interruption
 """
@@ -17,7 +19,7 @@ import argparse
 from pathlib import Path
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.scripts.demonstration_arguments import add_settings, settings_from
+from lerobot_excav.scripts.demonstration_arguments import add_settings, add_storage, settings_from
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--width", type=int, default=default.width, help=f"image width (default: {default.width})"
     )
+    add_storage(parser)
     add_settings(parser)
 
 
@@ -51,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         kept = "kept" if settings.keep_failures else "left out"
         print(f"{len(summary.failures)} episodes without success ({kept}): {' '.join(summary.failures)}")
     print(
-        f"{summary.simulated_s:.0f} s of digging in {summary.wall_s:.0f} s "
+        f"{summary.simulated_s:.0f} s simulated in {summary.wall_s:.0f} s "
         f"({summary.simulated_s / max(summary.wall_s, 1e-9):.1f} x real time)"
     )
     print(f"next: lerobot-excav qc {summary.out}")

@@ -20,7 +20,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.datasets.pair_coverage import PairCoverage, pair_coverage
+from lerobot_excav.datasets.environments import ENVIRONMENTS
+from lerobot_excav.datasets.pair_coverage import START_SETTINGS, PairCoverage, pair_coverage
 from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.split import SPLIT_UNITS, Split, split
 from lerobot_excav.datasets.version_check import episodes_by_version, require_one_version, versions_of
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("dataset", type=Path, help="folder of the dataset")
     parser.add_argument(
-        "--session", type=Path, help="session log of excavator_sim: add the excav.* columns first"
+        "--session", type=Path, help="session log of the simulated robot: add the excav.* columns first"
     )
     parser.add_argument(
         "--out", type=Path, help="with --session: put the completed dataset here, keep the recording"
@@ -106,11 +107,10 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
     lines = [
         "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in sorted(versions.items())),
-        "soil: "
-        + "; ".join(f"{soil}, {count} episodes" for soil, count in index["soil"].value_counts().items()),
+        *(_counts(name, index[name]) for name in START_SETTINGS if name in index),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
-        f"retained mass: {index['retained_mass_kg'].mean():.0f} kg on average",
+        ENVIRONMENTS[index["env"].iloc[0]].summary(index),
     ]
     if len(versions) > 1:
         lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")
@@ -118,6 +118,11 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     lines += [f"missing: {scene} lacks target {targets}" for scene, targets in coverage.missing.items()]
     lines += [f"duplicate: {uid} in episodes {episodes}" for uid, episodes in coverage.duplicates.items()]
     return lines
+
+
+def _counts(name: str, column: pd.Series) -> str:
+    parts = [f"{value}, {count} episodes" for value, count in column.value_counts().items()]
+    return f"{name}: {'; '.join(parts)}"
 
 
 def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame) -> None:

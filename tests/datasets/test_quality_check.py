@@ -71,7 +71,9 @@ def test_actions_out_of_range_are_found(tampered, toy_rig):
     def change(values, index):
         values[frames_of(4, index)[2]][1] = -1.5
 
-    assert problems(tampered("action", change), toy_rig) == {4: "an action reaches 1.5; allowed are -1 to 1"}
+    assert problems(tampered("action", change), toy_rig) == {
+        4: "action boom.vel reaches -1.5; allowed are -1 to 1"
+    }
 
 
 def test_a_mask_that_changes_is_found(tampered, toy_rig):

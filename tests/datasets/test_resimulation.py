@@ -7,6 +7,7 @@ import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
 
 from lerobot_excav.datasets import resimulation
+from lerobot_excav.datasets.excavator_environment import EXCAVATOR
 from lerobot_excav.datasets.paired_index import INDEX_PATH, build_index, write_index
 from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
@@ -20,7 +21,7 @@ def recording(paired_dataset, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded")
     dataset = LeRobotDataset("local/toy", root=paired_dataset, video_backend="pyav")
     remove_feature(
-        dataset, list(excav_features()), output_dir=folder / "recording", repo_id="local/recording"
+        dataset, list(excav_features(EXCAVATOR)), output_dir=folder / "recording", repo_id="local/recording"
     )
     index = build_index(paired_dataset)
     lines = [

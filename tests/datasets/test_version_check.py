@@ -1,14 +1,17 @@
 """The version of the simulation goes with the frames, and replays of another version are refused."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature, split_dataset
 
-from lerobot_excav.datasets import assembly, partial_run
+from lerobot_excav.datasets import partial_run
+from lerobot_excav.datasets.environments import ENVIRONMENTS
+from lerobot_excav.datasets.excavator_environment import EXCAVATOR
 from lerobot_excav.datasets.paired_index import build_index, write_index
 from lerobot_excav.datasets.quality_check import check_dataset
-from lerobot_excav.datasets.schema import UNMARKED
+from lerobot_excav.datasets.schema import unmarked_columns
 from lerobot_excav.datasets.version_check import require_one_version, versions_of
 from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -25,7 +28,9 @@ def load(root):
 def first_dataset(paired_dataset, tmp_path_factory):
     """Make a dataset as the first version did: without the column. Not to be changed by tests."""
     root = tmp_path_factory.mktemp("first") / "dataset"
-    remove_feature(load(paired_dataset), list(UNMARKED), output_dir=root, repo_id="local/first")
+    remove_feature(
+        load(paired_dataset), list(unmarked_columns(EXCAVATOR)), output_dir=root, repo_id="local/first"
+    )
     return root
 
 
@@ -33,7 +38,8 @@ def first_dataset(paired_dataset, tmp_path_factory):
 def mixed_dataset(paired_dataset, record_toy, tmp_path, monkeypatch):
     """Merge what this version and a later one recorded."""
     with monkeypatch.context() as patch:
-        patch.setattr(assembly, "SIMULATION_VERSION", SIMULATION_VERSION + 1)
+        later = replace(EXCAVATOR, simulation_version=SIMULATION_VERSION + 1)
+        patch.setitem(ENVIRONMENTS, "excavator", later)
         record_toy(tmp_path / "later", scenes=1)
     merge_datasets([load(paired_dataset), load(tmp_path / "later")], "local/m", output_dir=tmp_path / "mixed")
     return tmp_path / "mixed"

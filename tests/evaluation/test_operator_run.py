@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.environments import ENVIRONMENTS
+from lerobot_excav.datasets.excavator_environment import EXCAVATOR
 from lerobot_excav.datasets.rig import ExcavatorRig
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
-from lerobot_excav.evaluation import operator_run
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.operator_run import evaluate_operator
 
@@ -128,7 +129,7 @@ def test_an_interrupted_run_continues_to_the_same_file(tmp_path):
 def test_a_run_of_another_version_of_the_simulation_is_not_continued(tmp_path, monkeypatch):
     evaluate(tmp_path / "o.jsonl")
     (tmp_path / "o.jsonl").rename(tmp_path / "o.jsonl.partial")
-    monkeypatch.setattr(operator_run, "SIMULATION_VERSION", 99)
+    monkeypatch.setitem(ENVIRONMENTS, "excavator", replace(EXCAVATOR, simulation_version=99))
     with pytest.raises(ConfigurationError, match=f"simulation_version={SIMULATION_VERSION}, not 99"):
         evaluate(tmp_path / "o.jsonl", resume=True)
 

@@ -1,0 +1,35 @@
+"""How a dataset stores its pictures: as PNG in the table of frames, or as lossless video beside it.
+
+LeRobot decodes every `image` column of every row of the action chunk that it loads for one sample, 2 ms of a core per
+row for three pictures of 96 x 128: nothing at a chunk of 10, but 0.2 s per sample at a chunk of 100. Videos are left
+alone there, and only the sample's own pictures are decoded. So long chunks need videos, and a mask needs lossless ones.
+"""
+
+from typing import Any, Literal
+
+from lerobot_excav.errors import DatasetError
+
+Storage = Literal["image", "video"]
+STORAGES: tuple[Storage, ...] = ("image", "video")
+
+LOSSLESS_PIX_FMTS = ("yuv444p", "gbrp")
+"""Pixel formats that keep every pixel's colour; all others average colours over neighbouring pixels."""
+
+
+def require_lossless(key: str, info: dict[str, Any]) -> None:
+    """Check that a video keeps pictures as they were, but for rounding of colours by 2 grey levels.
+
+    Args:
+        key: The video's column.
+        info: What the dataset says of it.
+
+    Raises:
+        DatasetError: It was compressed with losses, or its settings are unknown.
+    """
+    crf, pix_fmt = info.get("video.crf"), info.get("video.pix_fmt")
+    if crf != 0 or pix_fmt not in LOSSLESS_PIX_FMTS:
+        raise DatasetError(
+            f"{key}: dtype='video' with crf={crf} and pix_fmt={pix_fmt!r}, which blurs the mask; needed are crf=0 and "
+            f"pix_fmt one of {', '.join(LOSSLESS_PIX_FMTS)}; record with --dataset.video=false, or with the encoder "
+            "settings of docs/datasets.md"
+        )
