@@ -83,9 +83,9 @@ def test_there_is_an_environment() -> None:
 # Joint velocities have no bound that a box could state.
 @pytest.mark.filterwarnings("ignore:.*Box observation space minimum value is -infinity:UserWarning")
 @pytest.mark.filterwarnings("ignore:.*Box observation space maximum value is infinity:UserWarning")
-@pytest.mark.filterwarnings("error::UserWarning")
-# An arm is commanded in radians.
+# An arm is commanded in radians, not in parts of its range.
 @pytest.mark.filterwarnings("ignore:.*For Box action spaces, we recommend:UserWarning")
+@pytest.mark.filterwarnings("error::UserWarning")
 def test_gymnasium_finds_nothing_wrong(gym_id: str) -> None:
     env = gym.make(gym_id, disable_env_checker=True)
     check_env(env.unwrapped)
