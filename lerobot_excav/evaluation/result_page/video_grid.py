@@ -19,7 +19,8 @@ FRAMES_PER_SECOND = 25
 TINT_RGB = (235, 60, 40)
 SUCCESS_RGB, FAILURE_RGB = (60, 180, 75), (128, 128, 128)
 
-_TINT = 0.45
+_TINT = 0.35
+_OUTLINE_RGB = (255, 255, 255)
 _TILE_HEIGHT = 192
 _BORDER = 4
 _QUALITIES = (26, 30, 34, 38, 42)  # constant rate factors of x264, from good to coarse
@@ -43,17 +44,18 @@ class Clip:
 
 
 def grid_clips(page: ResultPage) -> list[list[Clip]]:
-    """Return the clips of a page, row by row; empty where videos are gone or too few.
+    """Return the clips of a page whose videos are there, row by row.
 
     Raises:
         RenderingError: Pictures cannot be made on this machine.
     """
     rows = {row.row.label: row for row in page.rows}
-    return [
-        [_clip(rows[clips.label], number) for number in clips.episodes]
+    grid = [
+        [_clip(rows[clips.label], n) for n in clips.episodes if _video(rows[clips.label], n).is_file()]
         for clips in page.contents.clips
-        if clips.label in rows and all(_video(rows[clips.label], n).is_file() for n in clips.episodes)
+        if clips.label in rows
     ]
+    return [clips for clips in grid if clips]
 
 
 def _video(row: PageRow, number: int) -> Path:
@@ -117,7 +119,7 @@ def _tiles(clip: Clip) -> list[Image]:
     stride = max(1, round(_rate(clip.path) / FRAMES_PER_SECOND))
     colour = SUCCESS_RGB if clip.is_success else FAILURE_RGB
     return [
-        framed(enlarged(tinted(image, _mask_at(clip.masks, number))), colour)
+        framed(tinted(enlarged(image), enlarged(_mask_at(clip.masks, number))), colour)
         for number, image in enumerate(read_video(clip.path))
         if number % stride == 0
     ]
@@ -133,7 +135,7 @@ def _mask_at(masks: Sequence[ShownMask], frame: int) -> NDArray[np.bool_]:
 
 
 def tinted(image: Image, pixels: NDArray[np.bool_]) -> Image:
-    """Return a picture with some pixels tinted.
+    """Return a picture with some pixels tinted and outlined: they may be as red as the tint.
 
     Args:
         image: uint8 (H, W, 3).
@@ -141,11 +143,14 @@ def tinted(image: Image, pixels: NDArray[np.bool_]) -> Image:
     """
     result = image.copy()
     result[pixels] = ((1.0 - _TINT) * image[pixels] + _TINT * np.array(TINT_RGB)).astype(np.uint8)
+    around = np.pad(pixels, 1)
+    touched = around[2:, 1:-1] | around[:-2, 1:-1] | around[1:-1, 2:] | around[1:-1, :-2]
+    result[touched & ~pixels] = _OUTLINE_RGB
     return result
 
 
-def enlarged(image: Image) -> Image:
-    """Return a picture with every pixel repeated until it is about as high as a tile."""
+def enlarged[Pixels: (NDArray[np.uint8], NDArray[np.bool_])](image: Pixels) -> Pixels:
+    """Return a picture or mask with every pixel repeated until it is about as high as a tile."""
     times = max(1, round(_TILE_HEIGHT / image.shape[0]))
     return image.repeat(times, axis=0).repeat(times, axis=1)
 

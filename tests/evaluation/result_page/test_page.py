@@ -94,6 +94,12 @@ def test_the_page_is_written_with_data_plot_video_and_metrics(finished, tmp_path
     assert "](rollouts.mp4)" in text
 
 
+def test_a_missing_video_leaves_a_tile_out(finished, tmp_path):
+    (tmp_path / "test/paired/videos/fr5_grasp_0/eval_episode_0.mp4").unlink()
+    ((clip,),) = video_grid.grid_clips(make_page(finished))
+    assert clip.path.name == "eval_episode_1.mp4"
+
+
 def test_a_page_can_be_made_anew_from_its_copies(finished, tmp_path):
     out = tmp_path / "results"
     write_page(make_page(finished), out)

@@ -48,6 +48,9 @@ def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
     redness = [picture[96, 128, 0] - picture[96, 128, 2] for picture in pictures]
     assert max(redness[:4]) < 20
     assert min(redness[6:]) > 40
+    outline = [picture[60:68, 128].max() for picture in pictures]  # the mask begins at row 64
+    assert max(outline[:4]) < 150
+    assert min(outline[6:]) > 200
 
 
 def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch):
