@@ -224,9 +224,9 @@ def test_two_renderers_of_one_machine_do_not_disturb_each_other(machine, rendere
 
 def test_context_is_made_with_the_first_picture_and_freed_by_close(machine, soil):
     renderer = WorksiteRenderer(machine, height=32, width=32)
-    assert renderer._context is None
+    assert not renderer._pictures.is_open
     renderer.render("main", soil)
-    assert renderer._context is not None
+    assert renderer._pictures.is_open
     renderer.close()
     renderer.close()
     with pytest.raises(RenderingError, match="closed"):

@@ -55,6 +55,16 @@ def test_drawing_masks_leaves_pictures_as_they_were(renderer):
     assert np.array_equal(renderer.render("main"), before)
 
 
+def test_depth_is_the_distance_of_the_blocks_along_the_optical_axis(renderer, workcell):
+    depth_m = renderer.depth("main")
+    assert (depth_m.shape, depth_m.dtype) == ((96, 128), np.float32)
+    camera = workcell.data.camera("main")
+    axis_w = -camera.xmat.reshape(3, 3)[:, 2]
+    for pos_w, mask in zip(workcell.block_pos_w, renderer.block_masks(), strict=True):
+        on_block = depth_m[mask[..., 0] > 0]
+        assert np.abs(on_block - (pos_w - camera.xpos) @ axis_w).max() < 0.035  # half a diagonal
+
+
 def test_an_unknown_camera_is_refused(renderer):
     with pytest.raises(ConfigurationError, match="camera"):
         renderer.render("cab")
