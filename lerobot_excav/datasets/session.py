@@ -1,6 +1,6 @@
 """What the simulated robot noted while `lerobot-record` recorded: which scene and target each episode shows.
 
-The file is JSON Lines, one object per episode; `robots.excavator_sim.session_log` writes it.
+The file is JSON Lines, one object per episode; `robots.session_log` writes it.
 """
 
 from dataclasses import dataclass, fields

@@ -7,6 +7,7 @@ needs (`lerobot-excav index` does it): one JSON object per recorded episode,
      "fps": 10, "soil": "sand", "fidelity": "standard", "observation_height": 96, "observation_width": 128,
      "task": "Scoop-v0", "frames": 120, "restarts": []}
 
+`soil` and `fidelity` are the excavator's; the lines of other machines name their environment as `env` instead.
 `episode_index` is the episode's number in the dataset when it was recorded, `frames` how many actions were
 carried out, and `restarts` after which of them somebody restarted or changed the scene within the episode;
 an episode with restarts is no single demonstration and cannot be re-simulated from its start.
