@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import av.logging
 import datasets as hf_datasets
 import numpy as np
 from lerobot.configs.video import RGBEncoderConfig
@@ -71,6 +72,8 @@ def _image_writer(settings: DemonstrationSettings) -> dict[str, Any]:
 
 
 def _video_writer(settings: DemonstrationSettings) -> dict[str, Any]:
+    # LeRobot's encoders give libav's messages back to the terminal while others are at work.
+    av.logging.set_libav_level(av.logging.ERROR)
     return {
         "use_videos": True,
         "rgb_encoder": RGBEncoderConfig(**VIDEO_ENCODER),

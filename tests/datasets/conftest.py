@@ -1,4 +1,4 @@
-"""A tiny environment with the interface of the excavator's, and datasets made with it."""
+"""A tiny environment with the interface of the real ones, and datasets made with it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,13 +25,15 @@ class ToyEnv:
 
     def __init__(self, settings: DemonstrationSettings, noise: float = 0.0) -> None:
         self.settings, self.noise = settings, noise
+        self.names = settings.environment
+        self.joints = len(self.names.action_names)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         self.scene_id, self.target_id = options["scene_id"], options["target_id"]
         rng = np.random.default_rng(self.scene_id)
-        self.joint_pos = rng.uniform(-1, 1, 4)
+        self.joint_pos = rng.uniform(-1, 1, self.joints)
         self.view = rng.integers(0, 256, (self.settings.height, self.settings.width, 3), dtype=np.uint8)
-        self.joint_vel = np.zeros(4)
+        self.joint_vel = np.zeros(self.joints)
         self.frame = 0
         return self._observe(), self._info()
 
@@ -54,15 +56,18 @@ class ToyEnv:
         mask[4 + 4 * self.target_id :][:4, 8:16] = 255
         main = self.view.copy()
         main[0, 0] = self.frame
+        state = np.concatenate([self.joint_pos, self.joint_vel]).astype(np.float32)
+        _, second, _ = self.names.cameras
         return {
-            "agent_pos": np.concatenate([self.joint_pos, self.joint_vel]).astype(np.float32),
-            "pixels": {"main": main, "cab": self.view[::-1].copy(), "target_mask": mask},
+            "agent_pos": state[: len(self.names.state_names)],
+            "pixels": {"main": main, second: self.view[::-1].copy(), "target_mask": mask},
         }
 
     def _info(self) -> dict[str, Any]:
         done = self.frame >= min(self.settings.episode_length, FRAMES)
         failing = self.scene_id == 3 and self.target_id == 1
-        state = np.array([5, 50 * self.frame, 100 * self.frame, 0, 0, 0, 0, 0], dtype=np.float32)
+        state = np.zeros(len(self.names.task_state_names), dtype=np.float32)
+        state[:3] = 5, 50 * self.frame, 100 * self.frame
         return {"is_success": done and not failing, "task_state": state}
 
 
@@ -74,7 +79,8 @@ class ToyOperator:
         pass
 
     def act(self, env: Any) -> np.ndarray:
-        return self.rng.uniform(-1, 1, 4).astype(np.float32)
+        low, high = env.settings.environment.action_limits
+        return self.rng.uniform(low, high).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -98,7 +104,9 @@ def toy_settings() -> Any:
     """Make settings of small pictures; keywords change them."""
 
     def make(**changes: Any) -> DemonstrationSettings:
-        return DemonstrationSettings(**{"scenes": 3, "height": 32, "width": 48, **changes})
+        return DemonstrationSettings.of(
+            **{"env": "excavator", "scenes": 3, "height": 32, "width": 48, **changes}
+        )
 
     return make
 
@@ -114,6 +122,14 @@ def record_toy(toy_settings: Any) -> Any:
         )
 
     return record
+
+
+@pytest.fixture(scope="session")
+def arm_dataset(tmp_path_factory: pytest.TempPathFactory, record_toy: Any) -> Path:
+    """Two scenes of the arm with four targets each, pictures as video. Not to be changed by tests."""
+    out = tmp_path_factory.mktemp("arm") / "dataset"
+    record_toy(out, env="fr5_grasp", scenes=2)
+    return out
 
 
 @pytest.fixture(scope="session")

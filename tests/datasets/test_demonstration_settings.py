@@ -1,4 +1,6 @@
+import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -6,6 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.environments import ENVIRONMENTS
+from lerobot_excav.envs.fr5.nearest_block import nearest_block
+from lerobot_excav.envs.fr5.scene import draw_scene
 from lerobot_excav.errors import ConfigurationError
 
 
@@ -25,8 +30,64 @@ def test_one_target_per_scene_goes_round_the_targets():
     assert [pair.target_id for pair in pairs] == [0, 1, 2, 3, 0, 1, 2, 3]
 
 
-def test_settings_read_back():
-    settings = DemonstrationSettings(soil="gravel", scenes=7)
+def test_drawn_targets_are_equally_likely_and_belong_to_their_scene():
+    settings = DemonstrationSettings(scenes=400, targets=1, target_rule="uniform")
+    targets = [pair.target_id for pair in settings.pairs()]
+    assert min(Counter(targets).values()) > 70  # 100 each, 3.5 standard deviations below
+    assert [pair.target_id for pair in replace(settings, first_scene=7, scenes=3).pairs()] == targets[7:10]
+    assert [pair.target_id for pair in replace(settings, seed=1).pairs()] != targets
+    assert [pair.target_id for pair in replace(settings, scene_set="val").pairs()] != targets
+
+
+def test_the_nearest_target_is_that_of_the_scene():
+    settings = DemonstrationSettings.of("fr5_grasp", scenes=5, targets=1, target_rule="nearest")
+    nearest = [nearest_block(draw_scene("train", scene_id)) for scene_id in range(5)]
+    assert [pair.target_id for pair in settings.pairs()] == nearest
+    assert nearest != [pair.target_id for pair in replace(settings, target_rule="round").pairs()]
+
+
+@pytest.mark.parametrize(
+    ("env", "changes", "message"),
+    [
+        (
+            "excavator",
+            {"targets": 1, "target_rule": "nearest"},
+            "--target-rule=nearest has no meaning for --env=excav",
+        ),
+        (
+            "excavator",
+            {"targets": 2, "target_rule": "uniform"},
+            "--target-rule=uniform chooses a single target",
+        ),
+        ("fr5_grasp", {"soil": "sand"}, "--soil='sand' has no meaning for --env=fr5_grasp"),
+        ("fr5_grasp", {"fidelity": "fast"}, "--fidelity='fast' has no meaning for --env=fr5_grasp"),
+        ("fr5_grasp", {"task": "Scoop-v0"}, "--task='Scoop-v0' is not known; allowed: 'FR5Grasp-v0'"),
+        ("lathe", {}, "--env='lathe' is not known; allowed: 'excavator', 'fr5_grasp'"),
+    ],
+)
+def test_what_makes_no_sense_in_an_environment_is_refused(env, changes, message):
+    with pytest.raises(ConfigurationError, match=re.escape(message)):
+        DemonstrationSettings.of(env, **changes)
+
+
+def test_defaults_are_those_of_the_environment():
+    assert DemonstrationSettings.of("excavator") == DemonstrationSettings()
+    arm = DemonstrationSettings.of("fr5_grasp")
+    assert (arm.task, arm.fps, arm.episode_length, arm.storage) == ("FR5Grasp-v0", 50, 400, "video")
+    assert (arm.soil, arm.fidelity) == (None, None)
+
+
+def test_stored_settings_without_later_choices_are_what_was_done_then():
+    record = DemonstrationSettings(targets=1).as_record()
+    del record["target_rule"], record["storage"]
+    assert DemonstrationSettings.from_record(record, source=Path("s.json")) == DemonstrationSettings(
+        targets=1
+    )
+
+
+@pytest.mark.parametrize("env", ENVIRONMENTS)
+def test_settings_read_back(env):
+    settings = DemonstrationSettings.of(env, seed=3, scenes=7)
     assert DemonstrationSettings.from_record(settings.as_record(), source=Path("s.json")) == settings
 
 
@@ -67,6 +128,8 @@ def test_stored_settings_without_a_version_are_of_the_first():
         {"first_scene": -1},
         {"seed": -1},
         {"episode_length": 0},
+        {"storage": "gif"},
+        {"target_rule": "best"},
     ],
 )
 def test_a_value_out_of_range_is_named(changes):

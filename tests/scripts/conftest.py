@@ -1,5 +1,5 @@
 """The toy datasets of `tests/datasets`, for the commands that work on datasets."""
 
-from ..datasets.conftest import paired_dataset, record_toy, toy_rig, toy_settings
+from ..datasets.conftest import arm_dataset, paired_dataset, record_toy, toy_rig, toy_settings
 
-__all__ = ["paired_dataset", "record_toy", "toy_rig", "toy_settings"]
+__all__ = ["arm_dataset", "paired_dataset", "record_toy", "toy_rig", "toy_settings"]

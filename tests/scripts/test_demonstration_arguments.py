@@ -3,6 +3,7 @@ import argparse
 import pytest
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts import bench, demos
 from lerobot_excav.scripts.demonstration_arguments import settings_from
 
@@ -37,11 +38,32 @@ def test_the_operator_digs_in_test_scenes_by_default():
         ("soil", "gravel"),
         ("fidelity", "fine"),
         ("episode_length", 50),
+        ("storage", "video"),
     ],
 )
 def test_every_option_reaches_the_settings(field, value):
     settings = settings_from(parse(demos, "--out=x", f"--{field.replace('_', '-')}={value}"))
     assert getattr(settings, field) == value
+
+
+def test_the_defaults_of_the_arm_are_its_own():
+    assert settings_from(parse(demos, "--out=x", "--env=fr5_grasp")) == DemonstrationSettings.of("fr5_grasp")
+
+
+def test_the_rule_for_targets_reaches_the_settings():
+    settings = settings_from(parse(demos, "--out=x", "--targets=1", "--target-rule=uniform"))
+    assert settings.target_rule == "uniform"
+
+
+def test_a_setting_of_another_environment_is_refused():
+    with pytest.raises(ConfigurationError, match="--soil='sand' has no meaning for --env=fr5_grasp"):
+        settings_from(parse(demos, "--out=x", "--env=fr5_grasp", "--soil=sand"))
+
+
+def test_help_tells_the_defaults_of_every_environment(capsys):
+    with pytest.raises(SystemExit):
+        parse(demos, "--help")
+    assert "default: 10 for excavator, 50 for fr5_grasp" in " ".join(capsys.readouterr().out.split())
 
 
 def test_keeping_failures_is_a_switch():
