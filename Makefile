@@ -19,7 +19,7 @@ export TOKENIZERS_PARALLELISM := false
 .PHONY: help setup demo demo-fr5 table-manipulation test fuzz lint type wheel clean
 
 help: ## list the targets
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
+	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
 
 setup: $(READY) ## install everything into .venv
 

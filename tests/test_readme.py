@@ -45,7 +45,7 @@ def made_small(command):
 
 def test_make_targets_of_the_readme_exist():
     makefile = (ROOT / "Makefile").read_text()
-    targets = re.findall(r"^make ([a-z]+)|`make ([a-z]+)`", README, flags=re.MULTILINE)
+    targets = re.findall(r"^make ([a-z0-9-]+)|`make ([a-z0-9-]+)`", README, flags=re.MULTILINE)
     targets = [named or quoted for named, quoted in targets]
     assert {"demo", "test"} <= set(targets)
     for target in targets:

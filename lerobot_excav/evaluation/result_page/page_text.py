@@ -211,7 +211,7 @@ def _packages(page: ResultPage) -> str:
 
 
 def _commands(page: ResultPage) -> list[str]:
-    """List the commands, those of the trainings first."""
+    """List the commands, those of the trainings first, and name what has none."""
     parts = []
     for training in page.trainings:
         if training.command:
@@ -222,4 +222,9 @@ def _commands(page: ResultPage) -> list[str]:
             changed = " and changes" if record.modified else ""
             commit = f", commit {record.commit[:9]}{changed}" if record.commit else ""
             parts += [f"# {row.row.label}, seed {_or_dash(row.seed)}{commit}", record.command, ""]
-    return ["## Commands", "", "```bash", *parts[:-1], "```", ""] if parts else []
+    by_hand = [f"training {training.name}" for training in page.trainings if not training.command]
+    by_hand += [row.row.label for row in page.rows if row.provenance.record is None]
+    return [
+        *(["## Commands", "", "```bash", *parts[:-1], "```", ""] if parts else []),
+        *([f"Run by hand, without a record of the command: {', '.join(by_hand)}.", ""] if by_hand else []),
+    ]

@@ -130,4 +130,4 @@ def test_a_row_run_by_hand_has_no_record(finished, tmp_path, grasp_line, write_e
     (tmp_path / "test" / "later.json").unlink()
     row = make_page(finished).rows[2]
     assert row.provenance.record is None
-    assert "never run" in page_text(make_page(finished))
+    assert "Run by hand, without a record of the command: later." in page_text(make_page(finished))
