@@ -43,7 +43,7 @@ VIDEO_ENCODER = {
 }
 # Below the size of any episode, so that each has its own files: without torchcodec LeRobot opens a file for every
 # picture, and that costs the more the longer the file is (measured: 3.5 ms with 400 pictures, 25 ms with 80 000).
-VIDEO_FILE_SIZE_MB = 0.01
+VIDEO_FILE_SIZE_MB = 0.001
 
 
 def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDataset:
