@@ -7,7 +7,6 @@ from lerobot.envs.configs import EnvConfig
 
 from lerobot_excav.envs.configuration_simulation import SimulationEnvConfig
 from lerobot_excav.envs.fr5.features import ACTION_NAMES, CAMERAS, STATE_NAMES
-from lerobot_excav.envs.mask_noise import require_noise
 from lerobot_excav.envs.settings import FR5_EPISODE_DURATION_S, FR5_TASKS, require_retarget_frame
 
 
@@ -18,8 +17,6 @@ class FR5GraspEnvConfig(SimulationEnvConfig):
 
     Attributes:
         episode_length: Frames of an episode, which never ends earlier; None: those of 8 s.
-        mask_noise: Error of the mask: `none`, `shift`, `erode` or `dilate`.
-        mask_noise_px: Size of that error [px].
         retarget_frame: Frame before which another block is commanded; None: never.
     """
 
@@ -30,20 +27,13 @@ class FR5GraspEnvConfig(SimulationEnvConfig):
 
     task: str | None = "FR5Grasp-v0"
     fps: int = 50
-    mask_noise: str = "none"
-    mask_noise_px: int = 0
     retarget_frame: int | None = None
 
     @override
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_noise("env.", self.mask_noise, self.mask_noise_px)
         length = self.episode_length or round(FR5_EPISODE_DURATION_S * self.fps)
         require_retarget_frame("env.retarget_frame", self.retarget_frame, length)
 
     def _own_kwargs(self) -> dict[str, Any]:
-        return {
-            "mask_noise": self.mask_noise,
-            "mask_noise_px": self.mask_noise_px,
-            "retarget_frame": self.retarget_frame,
-        }
+        return {"retarget_frame": self.retarget_frame}

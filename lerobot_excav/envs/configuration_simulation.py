@@ -19,6 +19,7 @@ from lerobot_excav.envs.settings import (
     require_fps,
     require_image_size,
     require_integer,
+    require_mask_noise,
 )
 from lerobot_excav.errors import require, require_choice
 
@@ -38,6 +39,8 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
         observation_width: Width of every picture [px].
         scene_set: Stream of scenes: `train`, `val` or `test`. Evaluations meant for a report use `test`.
         mask_condition: What the target mask shows: `correct`, `zero`, `random` or `mismatched`.
+        mask_noise: Error of the mask: `none`, `shift`, `erode` or `dilate`; see `envs.mask_noise`.
+        mask_noise_px: Size of that error [px].
         metrics_path: JSON Lines file to which every finished episode is appended; see `envs.metrics_log`.
         metrics_episodes: Number of episodes to write; give it `--eval.n_episodes` when the batch size does
             not divide that, and LeRobot's surplus episodes stay out of the file. None writes all.
@@ -54,6 +57,8 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
     observation_width: int = 128
     scene_set: str = "train"
     mask_condition: str = "correct"
+    mask_noise: str = "none"
+    mask_noise_px: int = 0
     metrics_path: Path | None = None
     metrics_episodes: int | None = None
     render_mode: str | None = "rgb_array"
@@ -73,6 +78,7 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
         require_image_size("env.observation_width", self.observation_width)
         require_choice("env.scene_set", self.scene_set, SCENE_SETS)
         require_choice("env.mask_condition", self.mask_condition, MASK_CONDITIONS)
+        require_mask_noise("env.", self.mask_noise, self.mask_noise_px)
         require_episode_length("env.episode_length", self.episode_length)
         require_choice("env.render_mode", self.render_mode, RENDER_MODES)
         if self.metrics_episodes is not None:
@@ -106,6 +112,8 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
             "observation_width": self.observation_width,
             "scene_set": self.scene_set,
             "mask_condition": self.mask_condition,
+            "mask_noise": self.mask_noise,
+            "mask_noise_px": self.mask_noise_px,
             "render_mode": self.render_mode,
         }
         return shared | self._own_kwargs()

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.settings import MASK_NOISES
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.errors import require_choice
 
 
 def noisy_mask(
@@ -38,25 +38,6 @@ def noisy_mask(
             grown = _grown(grown)
         inside = grown if noise == "dilate" else ~grown
     return np.repeat(np.where(inside, 255, 0).astype(np.uint8)[..., None], 3, axis=-1)
-
-
-def require_noise(prefix: str, noise: str, size_px: int) -> None:
-    """Raise unless kind and size of the noise belong together.
-
-    Args:
-        prefix: What the user writes before the name of a field, such as `env.`.
-        noise: Kind of the noise.
-        size_px: Its size [px].
-
-    Raises:
-        ConfigurationError: The kind is unknown, or one of the two has no effect without the other.
-    """
-    require_choice(f"{prefix}mask_noise", noise, MASK_NOISES)
-    require(
-        (noise == "none") == (size_px == 0) and size_px >= 0,
-        f"{prefix}mask_noise={noise!r} and {prefix}mask_noise_px={size_px} do not belong together; "
-        "give a kind of noise and a size from 1 pixel on, or neither (none, 0)",
-    )
 
 
 def _shifted(inside: NDArray[np.bool_], size_px: int, rng: np.random.Generator) -> NDArray[np.bool_]:

@@ -1,10 +1,9 @@
-"""What the settings of `--env.type=excavator` and `--robot.type=excavator_sim` allow.
+"""What the settings of environments and simulated robots allow.
 
 Importing this loads no simulator, so that every command of LeRobot can parse its line quickly. For the same reason the
 names of the soil presets and fidelities are repeated here; a test keeps them equal.
 """
 
-from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
 
@@ -19,17 +18,31 @@ SOILS = ("sand", "gravel", "dirt", "wet_sand")
 FIDELITIES = ("fast", "standard", "fine")
 TARGETS_PER_SCENE = 4
 TICKS_PER_SECOND = 50
-EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
+EPISODE_DURATION_S = 20.0  # time limit of the excavator's episode unless another is asked for (kind: paper)
 FR5_EPISODE_DURATION_S = 8.0  # that of the arm (kind: paper, 400 frames at 50 Hz)
 RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
 
-_CHOICES = {
-    "scene_set": SCENE_SETS,
-    "mask_condition": MASK_CONDITIONS,
-    "soil": SOILS,
-    "fidelity": FIDELITIES,
-}
+
+def require_mask_noise(prefix: str, noise: str, size_px: int) -> None:
+    """Raise unless kind and size of the mask's noise belong together.
+
+    Args:
+        prefix: What the user writes before the name of a field, such as `env.`.
+        noise: Kind of the noise.
+        size_px: Its size [px].
+
+    Raises:
+        ConfigurationError: The kind is unknown, the size is no whole number from 0 on, or one has no effect without the
+            other.
+    """
+    require_choice(f"{prefix}mask_noise", noise, MASK_NOISES)
+    require_integer(f"{prefix}mask_noise_px", size_px, 0, IMAGE_SIZE_LIMITS[1])
+    require(
+        (noise == "none") == (size_px == 0),
+        f"{prefix}mask_noise={noise!r} and {prefix}mask_noise_px={size_px} do not belong together; "
+        "give a kind of noise and a size from 1 pixel on, or neither (none, 0)",
+    )
 
 
 def require_retarget_frame(field: str, frame: int | None, episode_length: int) -> None:
@@ -86,13 +99,13 @@ def require_fps(field: str, fps: int) -> None:
 
 
 def require_episode_length(field: str, frames: int | None) -> None:
-    """Raise unless an episode may have this length; None stands for `EPISODE_DURATION_S`.
+    """Raise unless an episode may have this length; None stands for the task's own.
 
     Raises:
         ConfigurationError: The length is no whole number from 1 on.
     """
     if frames is not None:
-        hint = f"It counts frames; leave it out for {EPISODE_DURATION_S:g} s."
+        hint = "It counts frames; leave it out for the task's own time limit."
         require_integer(field, frames, 1, hint=hint)
 
 
@@ -103,22 +116,3 @@ def require_image_size(field: str, size_px: int) -> None:
         ConfigurationError: The size is outside `IMAGE_SIZE_LIMITS`.
     """
     require_integer(field, size_px, *IMAGE_SIZE_LIMITS, hint="It counts pixels; the default is 96 x 128.")
-
-
-def require_worksite_settings(config: Any, *, prefix: str, fields: Sequence[str] = ()) -> None:
-    """Validate the fields that describe the simulated worksite.
-
-    Args:
-        config: Has `fps`, `observation_height`, `observation_width`, `scene_set`, `soil`, `fidelity` and
-            `fields`.
-        prefix: What the user writes before the name of a field, such as `env.`.
-        fields: Further fields out of `mask_condition`.
-
-    Raises:
-        ConfigurationError: A value is not allowed.
-    """
-    require_fps(f"{prefix}fps", config.fps)
-    for name in ("observation_height", "observation_width"):
-        require_image_size(f"{prefix}{name}", getattr(config, name))
-    for name in ("scene_set", "soil", "fidelity", *fields):
-        require_choice(f"{prefix}{name}", getattr(config, name), _CHOICES[name])

@@ -16,6 +16,11 @@ from lerobot_excav.errors import ConfigurationError
 
 GYM_IDS = sorted(gym_id for gym_id in gym.registry if gym_id.startswith("lerobot_excav/"))
 FRAMES = 12
+# What reports read of every task.
+METRICS = (
+    *("simulation_version", "task", "scene_set", "scene_id", "target_id", "is_success", "frames"),
+    *("mask_condition", "mask_noise", "mask_noise_px", "fps", "episode_length"),
+)
 
 Trace = list[tuple[dict[str, NDArray[Any]], float]]
 
@@ -40,6 +45,14 @@ def play(env: gym.Env[Any, Any], *, seed: int, frames: int = FRAMES) -> Trace:
         observation, reward, *_ = env.step(action)
         trace.append((flat(observation), float(reward)))
     return trace
+
+
+def start_of(gym_id: str, **settings: Any) -> dict[str, NDArray[Any]]:
+    """Return the first observation of the episode that `trace` plays, under other settings."""
+    env = gym.make(gym_id, disable_env_checker=True, **settings)
+    observation, _ = env.reset(seed=4)
+    env.close()
+    return flat(observation)
 
 
 def assert_same(a: Trace, b: Trace) -> None:
@@ -140,6 +153,39 @@ def test_the_mask_is_black_and_white_and_shows_something(trace: Trace) -> None:
     assert (mask == mask[..., :1]).all()
 
 
+@pytest.mark.parametrize("condition", ["zero", "random", "mismatched"])
+def test_a_mask_condition_changes_the_mask_alone(gym_id: str, trace: Trace, condition: str) -> None:
+    shown = start_of(gym_id, mask_condition=condition)
+    right = trace[0][0]
+    assert not np.array_equal(shown.pop("pixels/target_mask"), right["pixels/target_mask"])
+    assert all(np.array_equal(array, right[key]) for key, array in shown.items())
+
+
+@pytest.mark.parametrize(("noise", "growth"), [("shift", 0), ("erode", -1), ("dilate", 1)])
+def test_mask_noise_changes_the_mask_alone(gym_id: str, trace: Trace, noise: str, growth: int) -> None:
+    shown = start_of(gym_id, mask_noise=noise, mask_noise_px=2)
+    again = start_of(gym_id, mask_noise=noise, mask_noise_px=2)
+    right = trace[0][0]
+    mask, right_mask = (each["pixels/target_mask"] for each in (shown, right))
+    assert not np.array_equal(mask, right_mask)
+    assert np.array_equal(mask, again["pixels/target_mask"])
+    assert set(np.unique(mask)) == {0, 255}
+    assert np.sign((mask > 0).sum(dtype=int) - (right_mask > 0).sum(dtype=int)) == growth
+    del shown["pixels/target_mask"]
+    assert all(np.array_equal(array, right[key]) for key, array in shown.items())
+
+
+def test_noise_of_no_size_is_refused(gym_id: str) -> None:
+    for settings in ({"mask_noise": "shift"}, {"mask_noise_px": 2}):
+        with pytest.raises(ConfigurationError, match="mask_noise"):
+            gym.make(gym_id, **settings)
+
+
+def test_scene_sets_hold_other_scenes(gym_id: str) -> None:
+    starts = [start_of(gym_id, scene_set=scene_set)["pixels/main"] for scene_set in ("train", "val", "test")]
+    assert len({start.tobytes() for start in starts}) == 3
+
+
 def test_observations_share_no_memory(trace: Trace) -> None:
     arrays = [array for observation, _ in trace[:3] for array in observation.values()]
     for i, array in enumerate(arrays):
@@ -189,7 +235,9 @@ def test_an_episode_lasts_at_least_a_frame_and_ends_with_its_metrics(gym_id: str
     _, _, terminated, truncated, info = env.step(np.zeros(env.action_space.shape, np.float32))  # type: ignore[arg-type]
     assert (terminated, truncated) == (False, True)
     assert info["is_success"] is False
-    assert all(isinstance(value, (bool, int, float, str)) for value in info["episode_metrics"].values())
+    metrics = info["episode_metrics"]
+    assert all(isinstance(value, (bool, int, float, str)) for value in metrics.values())
+    assert set(METRICS) <= set(metrics)
     env.close()
 
 

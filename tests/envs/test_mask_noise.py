@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.mask_noise import noisy_mask, require_noise
+from lerobot_excav.envs.mask_noise import noisy_mask
+from lerobot_excav.envs.settings import require_mask_noise
 from lerobot_excav.errors import ConfigurationError
 
 HEIGHT, WIDTH = 40, 60
@@ -84,7 +85,17 @@ def test_results_are_black_and_white_in_three_equal_channels(noise):
     assert result.dtype == np.uint8
 
 
-@pytest.mark.parametrize(("noise", "size_px"), [("none", 1), ("shift", 0), ("erode", -1), ("blur", 1)])
-def test_kind_and_size_must_belong_together(noise, size_px):
-    with pytest.raises(ConfigurationError, match="mask_noise"):
-        require_noise("env.", noise, size_px)
+@pytest.mark.parametrize(
+    ("noise", "size_px", "named"),
+    [
+        ("none", 1, r"env\.mask_noise='none' and env\.mask_noise_px=1 .*or neither"),
+        ("shift", 0, r"env\.mask_noise='shift' and env\.mask_noise_px=0 .*from 1 pixel on"),
+        ("blur", 1, r"env\.mask_noise='blur' .*'dilate'"),
+        ("erode", -1, r"env\.mask_noise_px=-1 "),
+        ("erode", 1.5, r"env\.mask_noise_px=1\.5 "),
+        ("erode", True, r"env\.mask_noise_px=True "),
+    ],
+)
+def test_kind_and_size_must_belong_together(noise, size_px, named):
+    with pytest.raises(ConfigurationError, match=named):
+        require_mask_noise("env.", noise, size_px)

@@ -12,7 +12,10 @@ from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import Scene, draw_scene
 from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
+from lerobot_excav.envs.features import CAMERAS, STATE_NAMES
 from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
+from lerobot_excav.envs.mask_noise import noisy_mask
+from lerobot_excav.envs.observation import OBS_TYPES, observation_space
 from lerobot_excav.envs.selection import select_scene_and_target
 from lerobot_excav.envs.settings import (
     EPISODE_DURATION_S,
@@ -26,12 +29,12 @@ from lerobot_excav.envs.settings import (
     require_episode_length,
     require_fps,
     require_image_size,
+    require_mask_noise,
     require_task,
 )
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, require_choice
 
-OBS_TYPES = ("pixels_agent_pos", "agent_pos")
 TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
@@ -74,6 +77,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         observation_width: Image width W [px].
         scene_set: `train`, `val` or `test`.
         mask_condition: Which mask is shown, see `mask_condition.py`.
+        mask_noise: `none`, `shift`, `erode` or `dilate`, see `mask_noise.py`.
+        mask_noise_px: Size of the noise [px].
         fps: Frames per second; divides 50.
         episode_length: Time limit in frames; None: those of 20 s.
         soil: Name of the soil preset.
@@ -93,6 +98,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         observation_width: int = 128,
         scene_set: str = "train",
         mask_condition: str = "correct",
+        mask_noise: str = "none",
+        mask_noise_px: int = 0,
         fps: int = 10,
         episode_length: int | None = None,
         soil: str = "sand",
@@ -104,6 +111,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
+        require_mask_noise("", mask_noise, mask_noise_px)
         require_choice("soil", soil, SOILS)
         require_choice("fidelity", fidelity, FIDELITIES)
         require_choice("render_mode", render_mode, RENDER_MODES)
@@ -113,6 +121,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_episode_length("episode_length", episode_length)
         self.task, self.task_description = task, TASK_DESCRIPTION
         self.scene_set, self.mask_condition = scene_set, mask_condition
+        self.mask_noise, self.mask_noise_px = mask_noise, mask_noise_px
         self.soil_name, self.fidelity = soil, fidelity
         self.fps = fps
         self.episode_length = round(EPISODE_DURATION_S * fps) if episode_length is None else episode_length
@@ -120,7 +129,9 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self.observation_size = (observation_height, observation_width)
-        self.observation_space = _observation_space(self.observation_size, obs_type)
+        self.observation_space = observation_space(
+            obs_type, size=self.observation_size, cameras=CAMERAS, state_size=len(STATE_NAMES)
+        )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (4,), np.float32)
         self._ticks_per_frame = TICKS_PER_SECOND // fps
         self._worksite: Worksite | None = None
@@ -241,7 +252,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         points_w = self.renderer.terrain_points_w(self.worksite.soil)
         masks = [target_mask_img(target, points_w) for target in scene.targets]
         rng = corruption_rng(scene.scene_set, scene.scene_id, target_id)
-        return conditioned_mask(masks, target_id, self.mask_condition, rng)
+        mask = conditioned_mask(masks, target_id, self.mask_condition, rng)
+        return noisy_mask(mask, self.mask_noise, self.mask_noise_px, rng)
 
     def _draw_main(self) -> NDArray[np.uint8]:
         """Draw the main view, or repeat it if the worksite has not moved since: LeRobot's videos ask for it again."""
@@ -281,6 +293,8 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "scene_id": self.scene.scene_id,
             "target_id": self.target_id,
             "mask_condition": self.mask_condition,
+            "mask_noise": self.mask_noise,
+            "mask_noise_px": self.mask_noise_px,
             "soil": self.soil_name,
             "fidelity": self.fidelity,
             "fps": self.fps,
@@ -289,11 +303,3 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "frames": self._frame,
             **self.cycle.metrics(),
         }
-
-
-def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:
-    spaces: dict[str, gym.Space[Any]] = {"agent_pos": gym.spaces.Box(-np.inf, np.inf, (8,), np.float32)}
-    if obs_type == "pixels_agent_pos":
-        image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
-        spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(("main", "cab", "target_mask"), image))
-    return gym.spaces.Dict(spaces)

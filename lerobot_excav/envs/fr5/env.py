@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.fr5.features import CAMERAS, STATE_NAMES
 from lerobot_excav.envs.fr5.layout import BLOCK_COUNT
 from lerobot_excav.envs.fr5.rendering import WorkcellRenderer
 from lerobot_excav.envs.fr5.scene import GraspScene, draw_scene
@@ -13,7 +14,8 @@ from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.fr5.task import GraspTask
 from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW, Workcell
 from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
-from lerobot_excav.envs.mask_noise import noisy_mask, require_noise
+from lerobot_excav.envs.mask_noise import noisy_mask
+from lerobot_excav.envs.observation import OBS_TYPES, observation_space
 from lerobot_excav.envs.selection import select_scene_and_target
 from lerobot_excav.envs.settings import (
     FR5_EPISODE_DURATION_S,
@@ -25,11 +27,11 @@ from lerobot_excav.envs.settings import (
     require_episode_length,
     require_fps,
     require_image_size,
+    require_mask_noise,
     require_retarget_frame,
 )
 from lerobot_excav.errors import ConfigurationError, require_choice
 
-OBS_TYPES = ("pixels_agent_pos", "agent_pos")
 TASK_DESCRIPTION = "Put the block that the mask marks into the tray."
 _RETARGET_STREAM = 0x4E77  # names the random streams from which the second target is drawn
 
@@ -50,7 +52,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     |---|---|---|
     | `pixels/main` | (H, W, 3) uint8 | fixed view from beside the foot of the arm over blocks and tray |
     | `pixels/top` | (H, W, 3) uint8 | fixed view from above |
-    | `pixels/target_mask` | (H, W, 3) uint8, {0, 255} | commanded block in `main` when it was commanded, arm left out |
+    | `pixels/target_mask` | (H, W, 3) uint8, {0, 255} | commanded block in `main` when it was commanded, arm hidden |
     | `agent_pos` | (7,) float32 | six joint positions [rad], opening of the gripper [0 closed .. 1 open] |
 
     Action: float32 (7,), six joint position targets [rad] and the gripper's target [0..1]; clipped to the limits.
@@ -99,7 +101,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
-        require_noise("", mask_noise, mask_noise_px)
+        require_mask_noise("", mask_noise, mask_noise_px)
         require_choice("render_mode", render_mode, RENDER_MODES)
         require_fps("fps", fps)
         require_image_size("observation_height", observation_height)
@@ -118,7 +120,9 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         self.obs_type, self.render_mode = obs_type, render_mode
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self.observation_size = (observation_height, observation_width)
-        self.observation_space = _observation_space(self.observation_size, obs_type)
+        self.observation_space = observation_space(
+            obs_type, size=self.observation_size, cameras=CAMERAS, state_size=len(STATE_NAMES)
+        )
         self.action_space = gym.spaces.Box(
             ACTION_LOW.astype(np.float32), ACTION_HIGH.astype(np.float32), dtype=np.float32
         )
@@ -128,6 +132,9 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         self._grasp: GraspTask | None = None
         self._frame = 0
         self._main_img: NDArray[np.uint8] | None = None
+        self._start_masks: NDArray[np.uint8] = np.zeros(
+            (BLOCK_COUNT, observation_height, observation_width, 3), np.uint8
+        )
 
     @property
     def workcell(self) -> Workcell:
@@ -230,9 +237,15 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     def _draw_mask(self) -> None:
         if self.obs_type != "pixels_agent_pos":
             return
+        masks = self.renderer.block_masks()
+        if self._frame > 0:
+            # What another block or the tray's rim hides now is shown where it stood at the start.
+            is_hidden = ~masks.any(axis=(1, 2, 3))
+            masks[is_hidden] = self._start_masks[is_hidden]
+        else:
+            self._start_masks = masks
         rng = corruption_rng(self.scene_set, self.scene.scene_id, self.target_id)
-        masks = list(self.renderer.block_masks())
-        mask = conditioned_mask(masks, self.target_id, self.mask_condition, rng)
+        mask = conditioned_mask(list(masks), self.target_id, self.mask_condition, rng)
         self._mask_img = noisy_mask(mask, self.mask_noise, self.mask_noise_px, rng)
 
     def _draw_main(self) -> NDArray[np.uint8]:
@@ -266,16 +279,9 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "mask_condition": self.mask_condition,
             "mask_noise": self.mask_noise,
             "mask_noise_px": self.mask_noise_px,
-            "retarget_frame": np.nan if self.retarget_frame is None else self.retarget_frame,  # null in the file
+            # Not a number becomes null in the file.
+            "retarget_frame": np.nan if self.retarget_frame is None else self.retarget_frame,
             "fps": self.fps,
             "episode_length": self.episode_length,
             **self.grasp.episode_metrics,
         }
-
-
-def _observation_space(size: tuple[int, int], obs_type: str) -> gym.spaces.Dict:
-    spaces: dict[str, gym.Space[Any]] = {"agent_pos": gym.spaces.Box(-np.inf, np.inf, (7,), np.float32)}
-    if obs_type == "pixels_agent_pos":
-        image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
-        spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(("main", "top", "target_mask"), image))
-    return gym.spaces.Dict(spaces)

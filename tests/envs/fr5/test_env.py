@@ -145,6 +145,30 @@ def test_retargeting_changes_mask_target_and_what_success_means():
     env.close()
 
 
+def test_a_second_target_that_has_moved_is_marked_where_it_lies_then():
+    env = FR5GraspEnv(retarget_frame=2)
+    first = env.reset(options={"scene_id": 3, "target_id": 1})[0]
+    env.step(hold(env))
+    for i in range(4):
+        env.workcell.data.joint(f"block{i}").qpos[0] += 0.05
+    observation = env.step(hold(env))[0]
+    assert np.array_equal(observation["pixels"]["target_mask"], env.renderer.block_masks()[env.target_id])
+    assert not np.array_equal(observation["pixels"]["main"], first["pixels"]["main"])
+    env.close()
+
+
+def test_a_second_target_that_cannot_be_seen_is_marked_where_it_lay():
+    env = FR5GraspEnv(retarget_frame=2)
+    env.reset(options={"scene_id": 3, "target_id": 1})
+    start = env.renderer.block_masks()
+    env.step(hold(env))
+    for i in range(4):
+        env.workcell.data.joint(f"block{i}").qpos[0] += 2.0  # behind the camera
+    mask = env.step(hold(env))[0]["pixels"]["target_mask"]
+    assert np.array_equal(mask, start[env.target_id])
+    env.close()
+
+
 def test_operator_succeeds_with_the_second_target():
     env = FR5GraspEnv(obs_type="agent_pos", retarget_frame=30)
     env.reset(seed=1)
