@@ -25,10 +25,12 @@ class TargetToken(nn.Module):
         self.dim_model = dim_model
         # Attention adds position encodings to queries and keys only; values need the position in the content.
         self.position_proj = nn.Linear(dim_model, dim_model)
+        self.feature_gain = nn.Parameter(torch.zeros(()))
         self.kind_embed = nn.Parameter(torch.zeros(dim_model))
         self.no_target_embed = nn.Parameter(torch.zeros(dim_model))
         nn.init.normal_(self.kind_embed, std=0.02)
         nn.init.normal_(self.no_target_embed, std=0.02)
+        self.register_load_state_dict_pre_hook(_take_features_whole)  # type: ignore[no-untyped-call]
 
     def forward(self, features: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """Return the token and its position encoding.
@@ -47,10 +49,15 @@ class TargetToken(nn.Module):
         content = (features * weights).sum(dim=(2, 3))  # (B, D)
         position = mean_position(mask, cells, self.dim_model)  # (B, D)
         has_target = mask.flatten(1).any(dim=1, keepdim=True)
-        token = torch.where(
-            has_target, content + self.position_proj(position) + self.kind_embed, self.no_target_embed
-        )
+        placed = self.position_proj(position) + self.kind_embed
+        token = torch.where(has_target, self.feature_gain * content + placed, self.no_target_embed)
         return token, position
+
+
+def _take_features_whole(_: nn.Module, weights: dict[str, Tensor], prefix: str, *__: object) -> None:
+    """Complete a checkpoint from before the gain: its network was trained with a gain of one."""
+    if f"{prefix}position_proj.weight" in weights:
+        weights.setdefault(f"{prefix}feature_gain", torch.ones(()))
 
 
 def mean_position(mask: Tensor, cells: tuple[int, int], dim: int) -> Tensor:

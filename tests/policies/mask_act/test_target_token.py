@@ -9,9 +9,17 @@ SIZE = (CELLS[0] * STRIDE, CELLS[1] * STRIDE)
 
 
 @pytest.fixture
-def token():
+def fresh():
     torch.manual_seed(0)
     return TargetToken(DIM)
+
+
+@pytest.fixture
+def token(fresh):
+    """A token that has learned to use the features."""
+    with torch.no_grad():
+        fresh.feature_gain.fill_(0.7)
+    return fresh
 
 
 def features(seed=0, batch_size=1):
@@ -77,14 +85,14 @@ def test_pictures_that_the_cells_do_not_tile_are_encoded_from_edge_to_edge(token
 def test_a_mask_over_one_cell_takes_the_features_of_that_cell_alone(token):
     maps = features()
     content, position = token(maps, blob(16, 0, 16, 16))
-    expected = maps[0, :, 1, 0] + token.position_proj(position[0]) + token.kind_embed
+    expected = 0.7 * maps[0, :, 1, 0] + token.position_proj(position[0]) + token.kind_embed
     torch.testing.assert_close(content[0], expected)
 
 
 def test_the_features_of_cells_weigh_as_much_as_the_mask_covers_them(token):
     maps = features()
     content, position = token(maps, blob(0, 12, 16, 20))  # a quarter of cell 0, all of cell 1
-    pooled = content[0] - token.position_proj(position[0]) - token.kind_embed
+    pooled = (content[0] - token.position_proj(position[0]) - token.kind_embed) / 0.7
     torch.testing.assert_close(pooled, (maps[0, :, 0, 0] + 4 * maps[0, :, 0, 1]) / 5)
 
 
@@ -129,3 +137,20 @@ def test_an_empty_mask_beside_a_full_one_leaves_finite_gradients(token):
     assert torch.isfinite(maps.grad).all()
     assert not maps.grad[0].any()
     assert maps.grad[1].any()
+
+
+def test_a_fresh_token_reads_the_place_alone(fresh):
+    assert torch.equal(fresh(features(0), blob(3, 5))[0], fresh(features(1), blob(3, 5))[0])
+    assert not torch.equal(fresh(features(0), blob(3, 5))[0], fresh(features(0), blob(3, 6))[0])
+
+
+def test_training_finds_the_features(fresh):
+    fresh(features(), blob(3, 5))[0].square().sum().backward()
+    assert fresh.feature_gain.grad != 0
+
+
+def test_a_checkpoint_from_before_the_gain_takes_the_features_whole(fresh):
+    weights = fresh.state_dict()
+    del weights["feature_gain"]
+    fresh.load_state_dict(weights, strict=True)
+    assert fresh.feature_gain == 1
