@@ -7,10 +7,12 @@ import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
 
 from lerobot_excav.datasets import resimulation
+from lerobot_excav.datasets.environments import ENVIRONMENTS
 from lerobot_excav.datasets.excavator_environment import EXCAVATOR
 from lerobot_excav.datasets.paired_index import INDEX_PATH, build_index, write_index
 from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
+from lerobot_excav.datasets.storage import STORAGES
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
@@ -216,3 +218,36 @@ def test_a_damaged_session_names_the_line(recording, toy_rig, tmp_path, text, me
     (tmp_path / "s.jsonl").write_text(text)
     with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
         complete_recording(folder / "recording", tmp_path / "s.jsonl", out=tmp_path / "c", rig=toy_rig())
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_recording_of_the_arm_is_completed_from_either_storage(record_toy, toy_rig, tmp_path, storage):
+    record_toy(tmp_path / "original", env="fr5_grasp", scenes=1, storage=storage)
+    dataset = LeRobotDataset("local/o", root=tmp_path / "original", video_backend="pyav")
+    columns = list(excav_features(ENVIRONMENTS["fr5_grasp"]))
+    remove_feature(dataset, columns, output_dir=tmp_path / "recording", repo_id="local/r")
+    common = {
+        "env": "fr5_grasp",
+        "simulation_version": ENVIRONMENTS["fr5_grasp"].simulation_version,
+        "scene_set": "train",
+        "scene_id": 0,
+        "fps": 50,
+        "observation_height": 32,
+        "observation_width": 48,
+        "task": "FR5Grasp-v0",
+    }
+    lines = [{**common, "episode_index": number, "target_id": number} for number in range(4)]
+    session = write_session(tmp_path / "session.jsonl", lines)
+    complete_recording(tmp_path / "recording", session, rig=toy_rig())
+    index = build_index(tmp_path / "recording")
+    pd.testing.assert_frame_equal(index, build_index(tmp_path / "original"))
+    assert index["success"].all()
+
+
+def test_a_session_of_another_environment_is_refused(recording, session, toy_rig, tmp_path):
+    folder, _ = recording
+    changes = {"env": "fr5_grasp", "task": "FR5Grasp-v0", "simulation_version": 2}
+    with pytest.raises(
+        DatasetError, match="episode 1: the session is of fr5_grasp, the recording of excavator"
+    ):
+        complete_recording(folder / "recording", session({1: changes}), out=tmp_path / "c", rig=toy_rig())
