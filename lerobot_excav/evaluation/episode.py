@@ -25,6 +25,8 @@ class Episode:
         scene_id: Scene.
         target_id: Target that is commanded at first.
         mask_condition: Which mask was shown.
+        mask_noise: How it was disturbed.
+        mask_noise_px: By how much [px].
         is_success: Whether every part of the task succeeded.
     """
 
@@ -33,12 +35,20 @@ class Episode:
     scene_id: int
     target_id: int
     mask_condition: str
+    mask_noise: str
+    mask_noise_px: int
     is_success: bool
 
     @classmethod
     def completed(cls, record: dict[str, Any]) -> dict[str, Any]:
         """Return a line with the entries that an early version of the simulation did not write."""
         return record
+
+    @property
+    def mask(self) -> str:
+        """What the mask showed, in words."""
+        noise = "" if self.mask_noise == "none" else f", {self.mask_noise} {self.mask_noise_px} px"
+        return f"{self.mask_condition}{noise}"
 
     @property
     def key(self) -> EpisodeKey:

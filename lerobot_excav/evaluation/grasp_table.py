@@ -1,6 +1,7 @@
 """FR5Grasp-v0 in reports: success, and apart from it which block was grasped."""
 
 from dataclasses import dataclass
+from typing import override
 
 from lerobot_excav.evaluation.episode import Episode
 from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
@@ -17,8 +18,6 @@ class GraspEpisode(Episode):
 
     Attributes:
         final_target_id: Block that is commanded at the end; it differs from `target_id` where the command changed.
-        mask_noise: How the mask was disturbed.
-        mask_noise_px: By how much [px].
         retarget_frame: Frame at which the command changed; None if it did not.
         episode_return: Sum of the rewards.
         first_grasped_block: First block that the fingers lifted; -1 if they lifted none.
@@ -27,8 +26,6 @@ class GraspEpisode(Episode):
     """
 
     final_target_id: int
-    mask_noise: str
-    mask_noise_px: int
     retarget_frame: int | None
     episode_return: float
     first_grasped_block: int
@@ -58,11 +55,11 @@ class GraspEpisode(Episode):
         return self.is_success if self.grasped == COMMANDED else None
 
     @property
+    @override
     def mask(self) -> str:
         """What the mask showed, in words."""
-        noise = "" if self.mask_noise == "none" else f", {self.mask_noise} {self.mask_noise_px} px"
         change = "" if self.retarget_frame is None else f", changed at frame {self.retarget_frame}"
-        return f"{self.mask_condition}{noise}{change}"
+        return super().mask + change
 
 
 def _legend(operator: str | None) -> list[str]:

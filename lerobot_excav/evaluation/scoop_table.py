@@ -32,8 +32,9 @@ class ScoopEpisode(Episode):
 
     @classmethod
     def completed(cls, record: dict[str, Any]) -> dict[str, Any]:
-        """Add what the first version did not write: its number, and the fidelity, of which it had one only."""
-        record = {"simulation_version": UNMARKED_VERSION, **record}
+        """Add what earlier files do not hold: version and fidelity, of which there was one only, and noise, of none."""
+        defaults = {"simulation_version": UNMARKED_VERSION, "mask_noise": "none", "mask_noise_px": 0}
+        record = {**defaults, **record}
         if record["simulation_version"] == UNMARKED_VERSION:
             record.setdefault("fidelity", "standard")
         return record
@@ -62,11 +63,13 @@ SCOOP = TaskTable(
     episode=ScoopEpisode,
     constants={
         "mask_condition": "mask conditions",
+        "mask_noise": "kinds of mask noise",
+        "mask_noise_px": "strengths of mask noise",
         "soil": "soils",
         "fidelity": "fidelities",
         "simulation_version": "versions of the simulation",
     },
-    setting={"soil": "soil", "mask": "mask_condition"},
+    setting={"soil": "soil", "mask": "mask"},
     columns=(
         Column(key="target_success", header="target success [%]", kind=Kind.RATE, field="target_success"),
         Column(key="full_success", header="full success [%]", kind=Kind.RATE, field="is_success"),

@@ -66,6 +66,15 @@ def test_a_file_of_the_first_version_is_read(metrics_file, metrics_line):
     assert (episode.simulation_version, episode.fidelity) == (1, "standard")
 
 
+def test_a_file_from_before_there_was_noise_is_of_masks_without(metrics_file, metrics_line):
+    lines = [metrics_line(3), metrics_line(4, mask_noise="shift", mask_noise_px=2)]
+    episodes = [
+        *read_evaluation(metrics_file("old.jsonl", lines[:1])).episodes.values(),
+        *read_evaluation(metrics_file("new.jsonl", lines[1:])).episodes.values(),
+    ]
+    assert [episode.mask for episode in episodes] == ["correct", "correct, shift 2 px"]
+
+
 @pytest.mark.parametrize(("text", "message"), [("", "empty"), ("{", "not JSON"), ("3", "a JSON object")])
 def test_a_damaged_file_is_refused(tmp_path, text, message):
     (tmp_path / "m.jsonl").write_text(text)
@@ -85,8 +94,15 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, metrics_line):
 
 @pytest.mark.parametrize(
     "changes",
-    [{"mask_condition": "zero"}, {"soil": "gravel"}, {"fidelity": "fine"}, {"simulation_version": 1}],
+    [
+        {"mask_condition": "zero"},
+        {"mask_noise": "erode"},
+        {"mask_noise_px": 2},
+        {"soil": "gravel"},
+        {"fidelity": "fine"},
+        {"simulation_version": 1},
+    ],
 )
 def test_a_run_does_not_mix_conditions(make_run, metrics_line, changes):
-    with pytest.raises(ConfigurationError, match="mixes mask conditions, soils"):
+    with pytest.raises(ConfigurationError, match="mixes mask conditions, kinds of mask noise"):
         make_run("a", [metrics_line(1), metrics_line(2, **changes)])
