@@ -1,8 +1,8 @@
 """How a dataset stores its pictures: as PNG in the table of frames, or as lossless video beside it.
 
-LeRobot decodes every `image` column of every row of the action chunk that it loads for one sample, 2 ms of a core per
-row for three pictures of 96 x 128: nothing at a chunk of 10, but 0.2 s per sample at a chunk of 100. Videos are left
-alone there, and only the sample's own pictures are decoded. So long chunks need videos, and a mask needs lossless ones.
+LeRobot decodes every `image` column of every row of the action chunk that it loads for one sample: 13 ms of a core at a
+chunk of 10 and 112 ms at a chunk of 100, with three pictures of 96 x 128. Videos are left alone there, and only the
+sample's own pictures are decoded: 10 and 17 ms. So long chunks need videos, and a mask needs lossless ones.
 """
 
 from typing import Any, Literal

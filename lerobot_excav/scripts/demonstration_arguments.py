@@ -64,7 +64,7 @@ def add_storage(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--storage",
         choices=STORAGES,
-        help=f"pictures as PNG, or as lossless video for action chunks longer than about 20 (default: {shown})",
+        help=f"pictures as PNG, or as lossless video, which long action chunks need (default: {shown})",
     )
 
 
