@@ -33,7 +33,7 @@ class Backbone(nn.Module):
             self.stages, self.feature_count = torchvision_resnet(config, norm)
         self.coordinate_channels = config.coordinate_channels
         if config.coordinate_channels:
-            with_more_channels(next(m for m in self.stages.modules() if isinstance(m, nn.Conv2d)), 2)
+            with_coordinate_channels(next(m for m in self.stages.modules() if isinstance(m, nn.Conv2d)))
 
     def forward(self, views: Tensor) -> Tensor:
         """Return the feature map, shape (N, feature_count, h, w), of views (N, 4, H, W)."""
@@ -57,7 +57,7 @@ def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
     """
     stem = nn.Conv2d(3, SMALL_STEM_WIDTH, kernel_size=7, stride=4, padding=3, bias=False)
     nn.init.kaiming_normal_(stem.weight, mode="fan_out", nonlinearity="relu")
-    layers: list[nn.Module] = [with_more_channels(stem, 1), norm(SMALL_STEM_WIDTH), nn.ReLU(inplace=True)]
+    layers: list[nn.Module] = [with_mask_channel(stem), norm(SMALL_STEM_WIDTH), nn.ReLU(inplace=True)]
     width_in = SMALL_STEM_WIDTH
     for width, stride in SMALL_STAGES:
         same = width == width_in and stride == 1
@@ -93,29 +93,52 @@ def torchvision_resnet(config: MaskACTConfig, norm: type[nn.Module]) -> tuple[nn
         norm_layer=norm,
     )
     feature_count = resnet.fc.in_features
-    resnet.conv1 = with_more_channels(resnet.conv1, 1)
+    resnet.conv1 = with_mask_channel(resnet.conv1)
     # A ResNet's children run in their order of definition; the last two, pooling and classifier, stay behind.
     return nn.Sequential(OrderedDict(list(resnet.named_children())[:-2])), feature_count
 
 
-def with_more_channels(stem: nn.Conv2d, count: int) -> nn.Conv2d:
-    """Widen a first convolution, in place, by input channels that start at zero weight.
+def with_mask_channel(stem: nn.Conv2d) -> nn.Conv2d:
+    """Widen a first convolution, in place, by one input channel that starts at zero weight.
 
-    A fresh network is therefore blind to them, and equals its twin without them, until training finds a use for
-    them. Copying the mean of the RGB filters for a mask would start from a response to it as if it were brightness.
+    A fresh network is therefore blind to the mask, and equals its twin without one, until training finds a use for
+    it. Copying the mean of the RGB filters instead would start from a response to the mask as if it were brightness.
+
+    Args:
+        stem: Convolution over RGB, without bias.
+
+    Returns:
+        The same layer, over RGB and mask.
+    """
+    return widened(stem, torch.zeros_like(stem.weight[:, :1]))
+
+
+def with_coordinate_channels(stem: nn.Conv2d) -> nn.Conv2d:
+    """Widen a first convolution, in place, by two input channels with random weights as large as its RGB filters'.
+
+    From zero weights the network found the coordinates too late to profit in a short training.
 
     Args:
         stem: Convolution without bias.
-        count: Channels to add.
+
+    Returns:
+        The same layer, over two more channels.
+    """
+    return widened(stem, torch.randn_like(stem.weight[:, :2]) * stem.weight[:, :3].std().detach())
+
+
+def widened(stem: nn.Conv2d, weight: Tensor) -> nn.Conv2d:
+    """Append input channels to a convolution, in place.
+
+    Args:
+        stem: The convolution.
+        weight: Weights of the new channels, shape (out, new, k, k).
 
     Returns:
         The same layer.
     """
-    weight = stem.weight.detach()
-    stem.weight = nn.Parameter(
-        torch.cat([weight, torch.zeros_like(weight[:, :1]).expand(-1, count, -1, -1)], 1)
-    )
-    stem.in_channels += count
+    stem.weight = nn.Parameter(torch.cat([stem.weight.detach(), weight], dim=1))
+    stem.in_channels = stem.weight.shape[1]
     return stem
 
 
