@@ -18,12 +18,15 @@ from lerobot.processor import PolicyProcessorPipeline
 from lerobot.scripts.lerobot_eval import eval_policy
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
+from lerobot_excav.envs.configuration_fr5_grasp import FR5GraspEnvConfig
+from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION as FR5_SIMULATION_VERSION
 from lerobot_excav.envs.metrics_log import MetricsLog
 from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.vector import info_of_env, make_vector_env
 from lerobot_excav.errors import ConfigurationError
 
 EPISODES = 5
+ARM_STATE_SIZE = 7  # its actions are as long as its states
 
 
 def episode_length(seed: int) -> int:
@@ -87,7 +90,8 @@ class HalfPolicy(PreTrainedPolicy):
     def predict_action_chunk(self, batch: Any, **kwargs: Any) -> Any: ...
 
     def select_action(self, batch: Any, **kwargs: Any) -> Any:
-        return 0.1 * batch["observation.state"][:, :4]
+        state = batch["observation.state"]
+        return 0.1 * (state if state.shape[1] == ARM_STATE_SIZE else state[:, :4])
 
 
 def evaluate(env: Any, start_seed: int = 100) -> Any:
@@ -162,6 +166,52 @@ def test_the_excavator_gives_the_same_alone_and_beside_others(tmp_path: Path) ->
     settings |= {"fidelity": "standard", "episode_length": 4, "simulation_version": SIMULATION_VERSION}
     assert lines[0].items() >= settings.items()
     assert {"is_success", "retained_mass_kg", "frames"} <= set(lines[0])
+
+
+def test_the_arm_gives_the_same_alone_and_beside_others(tmp_path: Path) -> None:
+    results = []
+    for n_envs in (1, 3):
+        path = tmp_path / f"{n_envs}.jsonl"
+        config = FR5GraspEnvConfig(
+            episode_length=4,
+            scene_set="test",
+            mask_noise="shift",
+            mask_noise_px=2,
+            metrics_path=path,
+            metrics_episodes=EPISODES,
+        )
+        counted = evaluate(config.create_envs(n_envs)["fr5_grasp"][0], start_seed=1000)
+        results.append((counted, [json.loads(line) for line in path.read_text().splitlines()]))
+    assert results[0] == results[1]
+    _, lines = results[0]
+    assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
+        (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
+    ]
+    settings = {
+        "task": "FR5Grasp-v0",
+        "simulation_version": FR5_SIMULATION_VERSION,
+        "scene_set": "test",
+        "mask_condition": "correct",
+        "mask_noise": "shift",
+        "mask_noise_px": 2,
+        "retarget_frame": None,
+        "fps": 50,
+        "episode_length": 4,
+        "frames": 4,
+        "is_success": False,
+        "first_grasped_block": -1,
+        "blocks_in_tray": 0,
+    }
+    assert lines[0].items() >= settings.items()
+    wanted = {
+        "final_target_id",
+        "episode_return",
+        "max_reward",
+        "target_grasped",
+        "target_in_tray",
+        "released",
+    }
+    assert wanted <= set(lines[0])
 
 
 @pytest.mark.slow
