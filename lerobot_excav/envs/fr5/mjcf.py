@@ -46,6 +46,9 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     spec.visual.quality.offsamples = 0
     spec.visual.quality.shadowsize = 0
+    # The facets of capsules and cylinders are most of what is drawn; in pictures of 96 x 128 half as many look alike,
+    # and a picture takes 0.6 in place of 1.5 ms (measured).
+    spec.visual.quality.numslices, spec.visual.quality.numstacks, spec.visual.quality.numquads = 16, 8, 1
     spec.visual.map.znear, spec.visual.map.zfar = 0.02, 20.0
     spec.stat.extent = 1.0
 
