@@ -21,6 +21,7 @@ class GraspEpisode(Episode):
         retarget_frame: Frame at which the command changed; None if it did not.
         episode_return: Sum of the rewards.
         first_grasped_block: First block that the fingers lifted; -1 if they lifted none.
+        shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none.
         target_in_tray: Whether the commanded block rests in the tray.
         blocks_in_tray: How many blocks do.
     """
@@ -29,6 +30,7 @@ class GraspEpisode(Episode):
     retarget_frame: int | None
     episode_return: float
     first_grasped_block: int
+    shown_block: int
     target_in_tray: bool
     blocks_in_tray: int
 
@@ -50,6 +52,13 @@ class GraspEpisode(Episode):
         return self.grasped == COMMANDED if self.has_grasped else None
 
     @property
+    def mask_followed(self) -> bool | None:
+        """Of episodes that grasped a block and whose mask showed one: whether they are the same."""
+        if not self.has_grasped or self.shown_block == NO_BLOCK:
+            return None
+        return self.first_grasped_block == self.shown_block
+
+    @property
     def placed(self) -> bool | None:
         """Of episodes that grasped the commanded block first: whether they succeeded."""
         return self.is_success if self.grasped == COMMANDED else None
@@ -66,6 +75,7 @@ def _legend(operator: str | None) -> list[str]:
     lines = [
         "Success: at the end the commanded block, and no other, rests in the tray, released.",
         "Target selection: of the episodes that grasped any block, the share whose first was the commanded one.",
+        "Mask followed: of the episodes that grasped a block while the mask showed one, the share that took that one.",
         "Placed: of the episodes that grasped the commanded block first, the share that succeeded.",
         f"First grasped: episodes by the first block that was lifted, {' / '.join(GRASPED)}.",
     ]
@@ -90,6 +100,7 @@ GRASP = TaskTable(
         Column(
             key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"
         ),
+        Column(key="mask_followed", header="mask followed [%]", kind=Kind.RATE, field="mask_followed"),
         Column(key="placed", header="placed [%]", kind=Kind.RATE, field="placed"),
         Column(key="first_grasped", header="first grasped", kind=Kind.COUNTS, field="grasped", words=GRASPED),
     ),

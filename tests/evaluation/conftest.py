@@ -50,6 +50,7 @@ def grasp(number, **changes):
         "is_success": True,
         "episode_return": 800.0,
         "first_grasped_block": number % 4,
+        "shown_block": number % 4,
         "target_in_tray": True,
         "blocks_in_tray": 1,
         "released": True,

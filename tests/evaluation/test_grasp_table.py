@@ -38,6 +38,24 @@ def test_the_text_shows_rates_with_what_they_are_of(make_run, lines):
     assert "kg" not in text
 
 
+def test_following_a_wrong_mask_is_told_apart_from_the_command(make_run, grasp_line):
+    wrong = {**NOTHING, "mask_condition": "mismatched"}
+    lines = [
+        *(grasp_line(i, **wrong, shown_block=(i + 1) % 4, first_grasped_block=(i + 1) % 4) for i in range(3)),
+        grasp_line(3, **wrong, shown_block=0, first_grasped_block=3),
+        grasp_line(4, **wrong, shown_block=1, first_grasped_block=-1),
+    ]
+    (row,) = make_report([make_run("a", lines)]).runs
+    assert (row["mask_followed"].estimate, row["mask_followed"].n) == (0.75, 4)
+    assert row["target_selection"].estimate == 0.25
+
+
+def test_a_mask_without_a_block_cannot_be_followed(make_run, grasp_line):
+    lines = [grasp_line(0, mask_condition="zero", shown_block=-1)]
+    (row,) = make_report([make_run("a", lines)]).runs
+    assert row["mask_followed"] is None
+
+
 def test_nothing_grasped_leaves_selection_open(make_run, grasp_line):
     (row,) = make_report([make_run("a", [grasp_line(0, first_grasped_block=-1)])]).runs
     assert row["target_selection"] is None

@@ -11,7 +11,7 @@ from lerobot_excav.envs.fr5.layout import BLOCK_COUNT
 from lerobot_excav.envs.fr5.rendering import WorkcellRenderer
 from lerobot_excav.envs.fr5.scene import GraspScene, draw_scene
 from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION
-from lerobot_excav.envs.fr5.task import GraspTask
+from lerobot_excav.envs.fr5.task import NO_BLOCK, GraspTask
 from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW, Workcell
 from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.mask_noise import noisy_mask
@@ -235,6 +235,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         return int(rng.choice([i for i in range(BLOCK_COUNT) if i != self.target_id]))
 
     def _draw_mask(self) -> None:
+        self._shown_block = NO_BLOCK
         if self.obs_type != "pixels_agent_pos":
             return
         masks = self.renderer.block_masks()
@@ -246,6 +247,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             self._start_masks = masks
         rng = corruption_rng(self.scene_set, self.scene.scene_id, self.target_id)
         mask = conditioned_mask(list(masks), self.target_id, self.mask_condition, rng)
+        self._shown_block = next((i for i in range(BLOCK_COUNT) if np.array_equal(mask, masks[i])), NO_BLOCK)
         self._mask_img = noisy_mask(mask, self.mask_noise, self.mask_noise_px, rng)
 
     def _draw_main(self) -> NDArray[np.uint8]:
@@ -281,6 +283,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
             "mask_noise_px": self.mask_noise_px,
             # Not a number becomes null in the file.
             "retarget_frame": np.nan if self.retarget_frame is None else self.retarget_frame,
+            "shown_block": self._shown_block,
             "fps": self.fps,
             "episode_length": self.episode_length,
             **self.grasp.episode_metrics,

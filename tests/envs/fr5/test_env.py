@@ -121,6 +121,19 @@ def test_conditions_corrupt_the_mask():
     assert any(np.array_equal(shown["mismatched"], right[i]) for i in (0, 2, 3))
 
 
+@pytest.mark.parametrize("condition", ["correct", "zero", "random", "mismatched"])
+def test_metrics_name_the_block_whose_mask_is_shown(condition):
+    env = FR5GraspEnv(mask_condition=condition, episode_length=1)
+    shown = mask_of(env, scene_id=3, target_id=1)
+    block = env.step(hold(env))[4]["episode_metrics"]["shown_block"]
+    if condition in ("zero", "random"):
+        assert block == -1
+    else:
+        assert np.array_equal(env.renderer.block_masks()[block], shown)
+        assert (block == 1) == (condition == "correct")
+    env.close()
+
+
 @pytest.mark.parametrize(("noise", "grows"), [("erode", -1), ("dilate", 1), ("shift", 0)])
 def test_noise_changes_the_mask(seeing_env, noise, grows):
     right = mask_of(seeing_env, scene_id=3, target_id=1)
