@@ -1,6 +1,6 @@
 """Draw the picture of the README: the excavator at work, with the commanded dig region tinted.
 
-Usage: python examples/picture.py docs/images/dig.png [SCENE_ID TARGET_ID]
+Usage: python examples/picture_excavator.py docs/images/dig.png [SCENE_ID TARGET_ID]
 """
 
 import sys

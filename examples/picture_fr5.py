@@ -1,0 +1,44 @@
+"""Draw the picture of the FR5 environment: the start with the commanded block tinted, and the arm with it in the air.
+
+Usage: python examples/picture_fr5.py docs/images/blocks.png [SCENE_ID TARGET_ID]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from lerobot_excav.envs.fr5.env import FR5GraspEnv
+from lerobot_excav.envs.fr5.operator import ScriptedOperator
+from lerobot_excav.envs.fr5.rendering import WorkcellRenderer
+
+TINT_RGB = np.array([0, 235, 235])
+LIFTED = 2.0  # reward of a lifted block
+
+
+def main(path: Path, scene_id: int, target_id: int) -> None:
+    """Play until the block is well up, and save the main view of the start beside the overview of that moment."""
+    env = FR5GraspEnv(obs_type="agent_pos")
+    env.reset(options={"scene_id": scene_id, "target_id": target_id})
+    # Drawn at twice the size and reduced: the renderer does not smooth edges.
+    env.workcell.model.vis.quality.numslices, env.workcell.model.vis.quality.numstacks = 64, 32
+    renderer = WorkcellRenderer(env.workcell, height=960, width=1280)
+    start = renderer.render("main")
+    block = renderer.block_masks()[target_id][..., 0] > 0
+    start[block] = (0.35 * start[block] + 0.65 * TINT_RGB).astype(np.uint8)
+    operator = ScriptedOperator(rng=np.random.default_rng(0))
+    operator.reset(env)
+    lifted = 0
+    while lifted < 25:
+        lifted += env.step(operator.act(env))[1] >= LIFTED
+    overview = renderer.render("overview")
+    renderer.close()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    picture = Image.fromarray(np.concatenate([start, overview], axis=1))
+    picture.resize((1280, 480), Image.Resampling.LANCZOS).save(path, optimize=True)
+
+
+if __name__ == "__main__":
+    numbers = [int(word) for word in sys.argv[2:4]] or [3, 1]
+    main(Path(sys.argv[1]), *numbers)
