@@ -16,6 +16,7 @@ Examples:
 """
 
 import argparse
+import shlex
 import signal
 from collections.abc import Sequence
 from pathlib import Path
@@ -82,7 +83,10 @@ def _line(stage: Stage) -> str:
 
 
 def _script(experiment: Experiment, stages: Sequence[Stage]) -> list[str]:
-    lines = ["set -euo pipefail", *(f"export {k}={v}" for k, v in experiment.environment.items())]
+    lines = [
+        "set -euo pipefail",
+        *(f"export {k}={shlex.quote(v)}" for k, v in experiment.environment.items()),
+    ]
     for stage in stages:
         if not stage.is_finished:
             lines += ["", f"# {stage.name}", *stage.shell_lines()]

@@ -12,7 +12,7 @@ out = "{tmp_path}"
 colour = "red"
 
 [environment]
-SIZE = "3"
+SIZE = "3 cm"
 
 [[stage]]
 name = "paint"
@@ -48,7 +48,7 @@ def test_the_list_tells_how_far_the_stages_are(file, capsys):
 def test_a_dry_run_prints_a_script_and_runs_nothing(file, tmp_path, capsys):
     assert main(["experiment", str(file), "--dry-run", "--only", "paint"]) == 0
     script = capsys.readouterr().out
-    assert "export SIZE=3" in script
+    assert "export SIZE='3 cm'" in script
     assert f"mv {tmp_path}/paint.partial {tmp_path}/paint" in script
     assert not (tmp_path / "paint").exists()
 

@@ -15,7 +15,14 @@ from typing import IO
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.experiment.stage import Stage
-from lerobot_excav.evaluation.experiment.stage_record import attempt, log_path, new_record, read_record
+from lerobot_excav.evaluation.experiment.stage_record import (
+    StageRecord,
+    attempt,
+    log_path,
+    new_record,
+    read_record,
+    record_path,
+)
 
 PATIENCE_S = 20.0
 """How long a stopped command may take to end before it is killed [s]; a guess."""
@@ -48,7 +55,20 @@ class StageRun:
             output.write(f"\n# {self._started:%Y-%m-%d %H:%M:%S} UTC\n{self._command}\n\n")
             output.flush()
             self._said_from = output.tell()
+            self._record_start()
             self._process = _start(self._command, environment, output)
+
+    def _record_start(self) -> None:
+        """Tell the command before it runs: if this process is killed, the next one must know what began the result."""
+        makes = self.stage.makes
+        if makes is None:
+            return
+        goes_on = self._resumed or self.stage.appears_whole
+        if not (goes_on and record_path(makes).is_file()):
+            self._new_record().write(makes)
+
+    def _new_record(self) -> StageRecord:
+        return new_record(self.stage.name, self._command, self._environment)
 
     @property
     def exit_code(self) -> int | None:
@@ -83,8 +103,7 @@ class StageRun:
         makes, workspace = self.stage.makes, self.stage.workspace
         if makes is None or workspace is None:
             return succeeded
-        record = read_record(makes) if self._resumed or self.stage.appears_whole else None
-        record = record or new_record(self.stage.name, self._command, self._environment)
+        record = read_record(makes) or self._new_record()
         run = attempt(self._started, wall_s=self.wall_s, exit_code=exit_code)
         replace(record, attempts=[*record.attempts, run]).write(makes)
         if not succeeded or not workspace.exists():

@@ -8,6 +8,7 @@ import pytest
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.experiment.runner import run_experiment, state
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
+from lerobot_excav.evaluation.experiment.stage_run import StageRun
 
 # A command that leaves a trace of every run, then makes its folder.
 COUNTED = """
@@ -93,6 +94,17 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(experiment, tmp_pat
     assert record.command == training.stages[0].command
     assert [attempt["exit_code"] for attempt in record.attempts] == [1, 0]
     assert record.wall_s == pytest.approx(sum(attempt["wall_s"] for attempt in record.attempts))
+
+
+def test_a_training_goes_on_under_its_own_command_when_its_runner_was_killed(experiment, tmp_path):
+    training = experiment(RESUMED)
+    (stage,) = training.stages
+    StageRun(stage, {}, log_path(stage.makes)).stop()  # its end is never seen
+    (tmp_path / "train.partial").mkdir(exist_ok=True)
+    (tmp_path / "train.partial" / "checkpoint").touch()
+    assert run(training)[0]
+    assert read_record(stage.makes).command == stage.command
+    assert state(stage) == "finished"
 
 
 def test_a_stage_waits_for_those_it_needs(experiment, tmp_path):
