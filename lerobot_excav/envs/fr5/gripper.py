@@ -7,9 +7,6 @@ from lerobot_excav.envs.fr5.geoms import ARM, HARD_SOLREF, Kind
 
 _HAND_RGBA = (0.16, 0.17, 0.19, 1.0)
 _PAD_RGBA = (0.05, 0.05, 0.06, 1.0)
-_DAMPING_N_S_M = (
-    const.FINGER_FORCE_N / const.FINGER_SPEED_M_S
-)  # at full force the finger runs at its full speed
 _ROD_LENGTH_M = const.PAD_CENTRE_M - 0.5 * const.PAD_LENGTH_M - const.HAND_LENGTH_M
 
 

@@ -30,7 +30,8 @@ class ScriptedOperator:
     """Grasps the commanded block and puts it into the tray.
 
     It sees where the block lies and plans way-points, whose path inverse kinematics turns into joint position targets;
-    way-points and pace differ from grasp to grasp. A new command before it has taken hold makes it plan anew.
+    way-points and pace differ from grasp to grasp. A new command makes it plan anew, with open fingers: what they
+    hold by then falls.
 
     Args:
         rng: Source of way-points and pace.
