@@ -4,13 +4,12 @@ The record of its stage lies beside the metrics file, or beside their folder, as
 metrics files keep theirs, with the training in it.
 """
 
-import json
 import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from lerobot_excav.evaluation.experiment.stage_record import StageRecord, record_path
+from lerobot_excav.evaluation.experiment.stage_record import StageRecord, read_json, record_from, record_path
 from lerobot_excav.evaluation.training import Training, read_training
 
 _POLICY_PATH = re.compile(r"--policy\.path[= ](\S+)")
@@ -39,13 +38,16 @@ def read_provenance(metrics: Path) -> Provenance:
 
     Args:
         metrics: Its metrics file.
+
+    Raises:
+        DatasetError: What lies in the place of the record is none.
     """
     path = record_path(metrics.parent) if metrics.stem == "metrics" else metrics.with_suffix(".json")
     if not path.is_file():
         return Provenance()
-    content = json.loads(path.read_text())
+    content = read_json(path)
     training = content.pop("training", None)
-    record = StageRecord(**content) if content else None
+    record = record_from(content, path) if content else None
     if training is not None:
         return Provenance(record=record, training=Training(**training))
     return Provenance(record=record, training=_training(record))

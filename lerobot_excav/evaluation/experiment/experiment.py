@@ -112,6 +112,12 @@ def _stages(table: dict[str, Any], settings: Words, path: Path) -> list[Stage]:
         require_choice(f"{path}: key of a stage", key, _STAGE_KEYS)
     for key in ("name", "command"):
         require(key in table, f"{path}: a stage lacks {key!r}: {table}")
+    for key in ("name", "makes", "command", "resume_from", "resume"):
+        value = table.get(key, "")
+        require(isinstance(value, str), f"{path}: {key}={value!r} of a stage is no text; put it in quotes")
+    for key in ("each", "needs"):
+        value = table.get(key, [])
+        require(isinstance(value, list), f"{path}: {key}={value!r} of a stage is no list; put it in brackets")
     return [_stage(table, {**settings, **_texts(row)}, path) for row in table.get("each", [{}])]
 
 

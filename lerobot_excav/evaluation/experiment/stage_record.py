@@ -3,11 +3,14 @@
 import json
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from lerobot_excav.errors import DatasetError
+from lerobot_excav.evaluation.experiment.stage import partial_path
 
 PACKAGES = ("lerobot_env_excav", "lerobot", "torch", "mujoco", "numpy")
 
@@ -41,7 +44,10 @@ class StageRecord:
 
     def write(self, makes: Path) -> None:
         """Write the record of a result."""
-        record_path(makes).write_text(json.dumps(asdict(self), indent=1) + "\n")
+        path = record_path(makes)
+        partial = partial_path(path)
+        partial.write_text(json.dumps(asdict(self), indent=1) + "\n")
+        partial.replace(path)
 
 
 def record_path(makes: Path) -> Path:
@@ -55,9 +61,43 @@ def log_path(makes: Path) -> Path:
 
 
 def read_record(makes: Path) -> StageRecord | None:
-    """Read the record of a result; None if it has none, as when its command was run by hand."""
+    """Read the record of a result; None if it has none, as when its command was run by hand.
+
+    Raises:
+        DatasetError: The file in its place is none.
+    """
     path = record_path(makes)
-    return StageRecord(**json.loads(path.read_text())) if path.is_file() else None
+    return record_from(read_json(path), path) if path.is_file() else None
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises:
+        DatasetError: The file holds none.
+    """
+    try:
+        content = json.loads(path.read_text())
+    except ValueError as error:
+        raise DatasetError(f"{path} is damaged ({error}); remove it, what lies beside it is kept") from error
+    if not isinstance(content, dict):
+        raise DatasetError(f"{path} holds no JSON object; move it elsewhere")
+    return content
+
+
+def record_from(content: Mapping[str, Any], path: Path) -> StageRecord:
+    """Make a record of what was read from a file.
+
+    Raises:
+        DatasetError: It is something else.
+    """
+    unlike = sorted(set(content) ^ {entry.name for entry in fields(StageRecord)})
+    if unlike:
+        raise DatasetError(
+            f"{path} is no record of a stage, by its entries {', '.join(unlike)}; move it elsewhere: its name "
+            "is kept for the record of what lies beside it"
+        )
+    return StageRecord(**content)
 
 
 def new_record(stage: str, command: str, environment: Mapping[str, str]) -> StageRecord:

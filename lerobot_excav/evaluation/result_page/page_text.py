@@ -223,7 +223,9 @@ def _commands(page: ResultPage) -> list[str]:
             commit = f", commit {record.commit[:9]}{changed}" if record.commit else ""
             parts += [f"# {row.row.label}, seed {_or_dash(row.seed)}{commit}", record.command, ""]
     by_hand = [f"training {training.name}" for training in page.trainings if not training.command]
-    by_hand += [row.row.label for row in page.rows if row.provenance.record is None]
+    by_hand += [
+        f"{row.row.label} (seed {_or_dash(row.seed)})" for row in page.rows if row.provenance.record is None
+    ]
     return [
         *(["## Commands", "", "```bash", *parts[:-1], "```", ""] if parts else []),
         *([f"Run by hand, without a record of the command: {', '.join(by_hand)}.", ""] if by_hand else []),

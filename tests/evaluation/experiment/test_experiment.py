@@ -107,3 +107,12 @@ def test_stages_are_chosen_by_pattern(experiment):
     assert len(chosen.select([])) == 3
     with pytest.raises(ConfigurationError, match="--only='tset' matches no stage"):
         chosen.select(["tset"])
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [("command = 3", "command=3 .* no text"), ('command = "true"\neach = 4', "each=4 .* no list")],
+)
+def test_entries_of_another_type_are_named(experiment, entry, message):
+    with pytest.raises(ConfigurationError, match=message):
+        experiment(f'[[stage]]\nname = "a"\n{entry}\n')

@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.result_page import video_grid
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
 from lerobot_excav.evaluation.result_page.page import make_page
@@ -130,4 +131,14 @@ def test_a_row_run_by_hand_has_no_record(finished, tmp_path, grasp_line, write_e
     (tmp_path / "test" / "later.json").unlink()
     row = make_page(finished).rows[2]
     assert row.provenance.record is None
-    assert "Run by hand, without a record of the command: later." in page_text(make_page(finished))
+    assert "Run by hand, without a record of the command: later (seed 0)." in page_text(make_page(finished))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [('{"stage": "x"', "is damaged"), ('{"x": 1}', "no record"), ("3", "no JSON object")],
+)
+def test_a_file_in_the_place_of_a_record_is_named(finished, tmp_path, content, message):
+    (tmp_path / "test" / "zero.json").write_text(content)
+    with pytest.raises(DatasetError, match=f"zero.json .*{message}"):
+        make_page(finished)
