@@ -6,6 +6,12 @@ OUT=${1:?usage: demo_fr5.sh OUTPUT_FOLDER}
 CHECKPOINT=${DEMO_CHECKPOINT:-checkpoints/fr5_grasp_mask_act}
 EPISODES=${DEMO_EPISODES:-4} # test scenes, each played with the correct mask and with that of another block
 
+if [ ! -f "$CHECKPOINT/config.json" ]; then
+  echo "demo_fr5.sh: $CHECKPOINT holds no policy; run this in a clone of the repository, or name the pretrained_model" >&2
+  echo "  folder of a training: make demo-fr5 DEMO_CHECKPOINT=FOLDER" >&2
+  exit 2
+fi
+
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 
 rm -rf "$OUT/correct" "$OUT/mismatched"

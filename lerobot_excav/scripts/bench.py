@@ -11,6 +11,8 @@ Examples:
       100 test scenes with 4 targets each
   lerobot-excav bench operator --first-scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
+  lerobot-excav bench operator --env=fr5_grasp --scenes=100 --metrics=outputs/fr5_operator.jsonl
+      the arm's operator
   lerobot-excav bench soil --report
       docs/soil_validation.md and its plots; `bench soil --help` explains the experiments
   lerobot-excav bench fuzz --steps=200000

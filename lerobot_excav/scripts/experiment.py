@@ -11,7 +11,7 @@ Examples:
       the commands still to be run, as a shell script
   lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=2
       run them, two at a time
-  lerobot-excav experiment experiments/fr5_grasp/stages.toml --only 'data-*' train-paired --set steps=100
+  lerobot-excav experiment experiments/fr5_grasp/stages.toml --only 'data-*' 'train-*' --set batch_size=8
       some of them, with another value of a setting
 """
 
