@@ -9,7 +9,7 @@ from lerobot_excav.evaluation.result_page.contents import CURVES
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
-from lerobot_excav.evaluation.result_page.video_grid import grid_clips, write_grid
+from lerobot_excav.evaluation.result_page.video_grid import grid_clips, present_clips, write_grid
 
 
 def write_page(page: ResultPage, folder: Path) -> list[Path]:
@@ -37,7 +37,7 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     written = _pictures(page, folder)
     beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if (folder / name).exists()]
     texts = {
-        "report.md": page_text(page, files=beside),
+        "report.md": page_text(page, files=beside, clips=present_clips(page) or None),
         "report.json": json.dumps(page.as_dict(), indent=1) + "\n",
         "rows.jsonl": "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows),
     }

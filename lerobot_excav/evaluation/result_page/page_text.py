@@ -8,6 +8,7 @@ from lerobot_excav.evaluation.report_text import (
     simulations,
     value_text,
 )
+from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.curves import Curve, CurvePoint
 from lerobot_excav.evaluation.result_page.page import PageDifference, PageRow, PageSection, ResultPage
 from lerobot_excav.evaluation.task_table import Column, Kind
@@ -17,12 +18,13 @@ CURVE_PLOT = "success.png"
 VIDEO_GRID = "rollouts.mp4"
 
 
-def page_text(page: ResultPage, *, files: Sequence[str] = ()) -> str:
+def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Clips] | None = None) -> str:
     """Write a page as Markdown.
 
     Args:
         page: The page.
         files: Names of the plots and videos that lie beside it.
+        clips: What the video grid shows, from top to bottom; None: all that the contents name.
     """
     parts = [f"# {page.contents.title}", "", *_paragraph(page.contents.text)]
     for section in page.sections:
@@ -31,7 +33,8 @@ def page_text(page: ResultPage, *, files: Sequence[str] = ()) -> str:
         return "\n".join([*parts, "Nothing has been run yet.", ""])
     parts += _curves(page.curves, files)
     if VIDEO_GRID in files:
-        parts += ["## Rollouts", "", *_video(page), ""]
+        shown = page.contents.clips if clips is None else clips
+        parts += ["## Rollouts", "", *_video(shown), ""]
     parts += _trainings(page)
     parts += ["## How to read this", "", *(f"- {line}" for line in _legend(page)), ""]
     parts += _commands(page)
@@ -151,11 +154,11 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f}"
 
 
-def _video(page: ResultPage) -> list[str]:
+def _video(shown: Sequence[Clips]) -> list[str]:
     lines = [f"[{VIDEO_GRID}]({VIDEO_GRID}), the mask tinted; from top to bottom:", ""]
     return [
         *lines,
-        *(f"- `{clips.label}`, episodes {_list(clips.episodes)}" for clips in page.contents.clips),
+        *(f"- `{clips.label}`, episodes {_list(clips.episodes)}" for clips in shown),
     ]
 
 

@@ -1,7 +1,7 @@
 """Rollouts side by side: the videos of `lerobot-eval` as tiles of one small video, the mask tinted."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
+from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
 
 MAX_BYTES = 1_500_000
@@ -50,12 +51,18 @@ def grid_clips(page: ResultPage) -> list[list[Clip]]:
         RenderingError: Pictures cannot be made on this machine.
     """
     rows = {row.row.label: row for row in page.rows}
-    grid = [
-        [_clip(rows[clips.label], n) for n in clips.episodes if _video(rows[clips.label], n).is_file()]
+    return [[_clip(rows[clips.label], n) for n in clips.episodes] for clips in present_clips(page)]
+
+
+def present_clips(page: ResultPage) -> list[Clips]:
+    """Return what the video grid of a page can show: its contents without the episodes whose videos are not there."""
+    rows = {row.row.label: row for row in page.rows}
+    present = [
+        replace(clips, episodes=tuple(n for n in clips.episodes if _video(rows[clips.label], n).is_file()))
         for clips in page.contents.clips
         if clips.label in rows
     ]
-    return [clips for clips in grid if clips]
+    return [clips for clips in present if clips.episodes]
 
 
 def _video(row: PageRow, number: int) -> Path:

@@ -99,6 +99,8 @@ def test_a_missing_video_leaves_a_tile_out(finished, tmp_path):
     (tmp_path / "test/paired/videos/fr5_grasp_0/eval_episode_0.mp4").unlink()
     ((clip,),) = video_grid.grid_clips(make_page(finished))
     assert clip.path.name == "eval_episode_1.mp4"
+    write_page(make_page(finished), tmp_path / "results")
+    assert "- `paired`, episodes 1\n" in (tmp_path / "results" / "report.md").read_text()
 
 
 def test_a_page_can_be_made_anew_from_its_copies(finished, tmp_path):
