@@ -182,6 +182,17 @@ def test_a_second_target_that_cannot_be_seen_is_marked_where_it_lay():
     env.close()
 
 
+def test_the_second_target_depends_on_scene_and_first_target_alone():
+    def second(env, scene_id, action):
+        env.reset(options={"scene_id": scene_id, "target_id": 1})
+        return env.step(action)[4]["target_id"]
+
+    env, other = (FR5GraspEnv(obs_type="agent_pos", retarget_frame=1) for _ in range(2))
+    chosen = [second(env, scene_id, np.zeros(7)) for scene_id in range(12)]
+    assert set(chosen) == {0, 2, 3}
+    assert chosen[::-1] == [second(other, scene_id, np.ones(7)) for scene_id in reversed(range(12))]
+
+
 def test_operator_succeeds_with_the_second_target():
     env = FR5GraspEnv(obs_type="agent_pos", retarget_frame=30)
     env.reset(seed=1)

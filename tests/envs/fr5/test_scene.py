@@ -3,6 +3,7 @@ import pytest
 
 from lerobot_excav.envs.fr5 import layout
 from lerobot_excav.envs.fr5.scene import draw_scene
+from lerobot_excav.envs.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import ConfigurationError
 
 SCENES = [draw_scene("train", i) for i in range(50)]
@@ -18,6 +19,10 @@ def test_blocks_lie_in_their_area_and_apart():
         assert (z_w == layout.block_rest_height_m()).all()
         distance = np.linalg.norm(scene.block_pos_w[:, None] - scene.block_pos_w[None], axis=-1)
         assert distance[~np.eye(4, dtype=bool)].min() >= layout.BLOCK_SPACING_M
+
+
+def test_every_block_is_a_target():
+    assert layout.BLOCK_COUNT == TARGETS_PER_SCENE
 
 
 def test_the_same_number_gives_the_same_scene():

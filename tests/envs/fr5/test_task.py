@@ -59,6 +59,26 @@ def test_a_second_block_in_the_tray_spoils_the_success(task, workcell):
     assert task.episode_metrics["blocks_in_tray"] == 2
 
 
+def test_a_block_in_the_tray_that_a_finger_touches_is_not_released(task, workcell, monkeypatch):
+    put(workcell, 1, IN_TRAY)
+    hold(workcell)
+    touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
+    touching[0, 1] = True
+    monkeypatch.setattr(workcell, "fingers_touching", lambda: touching)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert not task.episode_metrics["released"]
+
+
+@pytest.mark.parametrize("offset", [(-layout.TRAY_RADIUS_M - 0.01, 0, 0), (0, 0, layout.BLOCK_SIZE_M)])
+def test_a_block_beside_the_tray_or_above_its_floor_is_not_in_it(task, workcell, offset):
+    put(workcell, 1, np.add(IN_TRAY, offset))
+    workcell.tick(np.append(SCENE.joint_pos, 1.0))
+    workcell.data.joint("block1").qvel[:] = 0
+    task.update()
+    assert not task.episode_metrics["target_in_tray"]
+
+
 def test_a_block_that_still_moves_does_not_rest(task, workcell):
     put(workcell, 1, np.add(IN_TRAY, (0, 0, 0.008)))
     workcell.data.joint("block1").qvel[0] = 0.3
@@ -78,10 +98,35 @@ def test_stages_of_the_reward_come_in_order_and_end_at_their_greatest(play):
     assert task.episode_metrics["max_reward"] == 4.0
 
 
-def test_first_grasped_block_is_remembered(play):
+def test_a_block_that_the_operator_fetches_counts_as_grasped(play):
     task, _, _ = play(2, 3)
     assert task.episode_metrics["first_grasped_block"] == 3
     assert task.episode_metrics["target_grasped"]
+
+
+def lift(task, workcell, monkeypatch, block, pads):
+    """Show the task a block 10 cm above the table that some of the pads touch; return the frame's reward."""
+    position_w = workcell.block_pos_w
+    position_w[block, 2] += 0.1
+    touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
+    touching[:pads, block] = True
+    with monkeypatch.context() as patch:
+        patch.setattr(type(workcell), "block_pos_w", position_w)
+        patch.setattr(workcell, "fingers_touching", lambda: touching)
+        return task.update()
+
+
+def test_the_first_grasped_block_is_remembered_when_another_is_lifted(task, workcell, monkeypatch):
+    for block in (3, 1):
+        lift(task, workcell, monkeypatch, block, pads=2)
+    assert task.episode_metrics["first_grasped_block"] == 3
+    assert not task.episode_metrics["target_grasped"]
+
+
+@pytest.mark.parametrize(("pads", "reward"), [(0, 0.0), (1, 0.0), (2, 2.0)])
+def test_a_block_is_lifted_by_both_fingers_only(task, workcell, monkeypatch, pads, reward):
+    assert lift(task, workcell, monkeypatch, 1, pads) == reward
+    assert task.episode_metrics["first_grasped_block"] == (1 if pads == 2 else NO_BLOCK)
 
 
 def test_task_state_tells_of_the_commanded_block(task, workcell):
