@@ -68,6 +68,18 @@ def test_the_page_shows_what_the_stages_make(path):
         assert f"{contents.metrics}/{row.label}" in made
     for curve in contents.curve:
         assert any(folder.startswith(f"{curve.folder}/") for folder in made)
+    shown = {curve.folder for curve in contents.curve} | {f"{contents.metrics}"}
+    evaluated = {str(Path(folder).parent) for folder in made if "/val/" in folder or "/test/" in folder}
+    assert evaluated <= shown
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
+def test_another_output_folder_is_the_pages_as_well(path):
+    experiment = read_experiment(path, {"out": "elsewhere"})
+    options = parse(shlex.split(experiment.stage("report").command))
+    contents = read_contents(options.rows, metrics=options.metrics)
+    assert contents.metrics == "elsewhere/test"
+    assert all(curve.folder.startswith("elsewhere/") for curve in contents.curve)
 
 
 def test_the_examples_page_can_be_read():

@@ -97,12 +97,21 @@ def _start_ready(
         log = experiment_log(experiment, stage)
         say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
         say("    " + " && \\\n    ".join(stage.shell_lines()))
+        if _goes_on_differently(stage):
+            say(
+                f"    begun by another command than the file has now, and goes on as that; or remove {stage.workspace}"
+            )
         try:
             running.append(StageRun(stage, experiment.environment, log))
         except ConfigurationError as error:
             say(f"! {stage.name}: {error}")
             refused.append(stage.name)
     return refused
+
+
+def _goes_on_differently(stage: Stage) -> bool:
+    record = read_record(stage.makes) if stage.makes is not None and stage.resumes else None
+    return record is not None and record.command != stage.command
 
 
 def experiment_log(experiment: Experiment, stage: Stage) -> Path:

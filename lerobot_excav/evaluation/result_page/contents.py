@@ -1,5 +1,6 @@
 """What stands on a result page, as a TOML file says it."""
 
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -131,7 +132,8 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
 
     Args:
         path: The TOML file.
-        metrics: Folder of the metrics files in place of the file's: one that a page has kept, with the curves in it.
+        metrics: Folder of the metrics files in place of the file's: one that a page has kept, with the curves in it,
+            or that of another run of the experiment, with the curves where they lie seen from the file's folder.
 
     Raises:
         ConfigurationError: The file is missing or damaged, a key is unknown or missing, a row occurs twice, or a
@@ -144,9 +146,9 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"--rows={path} is no TOML: {error}") from error
     if metrics is not None:
-        content["metrics"] = str(metrics)
         for table in content.get("curve", ()):
-            table["folder"] = str(metrics / CURVES / Path(table.get("folder", "")).name)
+            table["folder"] = str(_moved(Path(table.get("folder", "")), content.get("metrics", ""), metrics))
+        content["metrics"] = str(metrics)
     place = str(path)
     contents = Contents.read(
         content,
@@ -160,6 +162,16 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     )
     _check(contents, place)
     return contents
+
+
+def _moved(folder: Path, metrics: str, moved_metrics: Path) -> Path:
+    """Return where the metrics of a curve lie when those of the rows lie elsewhere."""
+    kept = moved_metrics / CURVES / folder.name
+    return (
+        kept
+        if kept.exists()
+        else Path(os.path.normpath(moved_metrics / os.path.relpath(folder, metrics or ".")))
+    )
 
 
 def _section(table: Mapping[str, Any], place: str) -> Section:

@@ -107,6 +107,13 @@ def test_a_training_goes_on_under_its_own_command_when_its_runner_was_killed(exp
     assert state(stage) == "finished"
 
 
+def test_a_training_that_goes_on_with_other_settings_than_the_file_has_says_so(experiment):
+    assert not run(experiment(RESUMED))[0]
+    said = run(experiment(RESUMED.replace("touch {makes}/checkpoint", "echo > {makes}/checkpoint")))[1]
+    assert "begun by another command than the file has now" in said
+    assert "remove" in said
+
+
 def test_a_stage_waits_for_those_it_needs(experiment, tmp_path):
     text = counted("slow", "sleep 0.5 && mkdir {makes}")
     text += counted("after", "test -d {tmp}/slow && mkdir {makes}") + 'needs = ["slow"]\n'

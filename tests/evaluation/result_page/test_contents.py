@@ -40,3 +40,14 @@ def test_a_missing_file_is_named(tmp_path):
 def test_metrics_lie_in_a_folder_or_a_file(tmp_path, read):
     contents = read(f'[[section]]\ntitle = "s"\nrows = [{ROW}]')
     assert str(contents.metrics_path("a")) == "m/a.jsonl"
+
+
+def test_with_metrics_elsewhere_curves_lie_where_they_did_seen_from_there(tmp_path):
+    path = tmp_path / "rows.toml"
+    path.write_text('title = "t"\nmetrics = "a/test"\n[[curve]]\nlabel = "c"\nfolder = "a/val/c"\n')
+    other = tmp_path / "other" / "test"
+    (curve,) = read_contents(path, metrics=other).curve
+    assert curve.folder == str(tmp_path / "other" / "val" / "c")
+    (other / "curves" / "c").mkdir(parents=True)  # as a page keeps them
+    (curve,) = read_contents(path, metrics=other).curve
+    assert curve.folder == str(other / "curves" / "c")
