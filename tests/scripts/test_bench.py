@@ -50,3 +50,12 @@ def test_options_of_the_machine_are_refused_for_the_operator(option, tmp_path, c
     assert main(["bench", option, "operator", f"--metrics={tmp_path / 'm'}", "--scenes=1"]) == 2
     assert f"{option.partition('=')[0]} " in capsys.readouterr().err
     assert not (tmp_path / "m").exists()
+
+
+def test_the_arms_operator_plays_scenes(tmp_path, capsys):
+    metrics = tmp_path / "operator.jsonl"
+    options = ["--scenes=1", "--targets=1", "--episode-length=4", "--workers=0", f"--metrics={metrics}"]
+    assert main(["bench", "operator", "--env=fr5_grasp", *options]) == 0
+    (line,) = map(json.loads, metrics.read_text().splitlines())
+    assert (line["task"], line["scene_set"], line["operator"]) == ("FR5Grasp-v0", "test", "scripted")
+    assert "target selection [%]" in capsys.readouterr().out

@@ -209,8 +209,10 @@ def _legend(page: ResultPage) -> list[str]:
 
 
 def _packages(page: ResultPage) -> str:
-    found = {row.provenance.record and tuple(row.provenance.record.packages.items()) for row in page.rows}
-    return "; or ".join(", ".join(f"{k} {v}" for k, v in sorted(packages)) for packages in found if packages)
+    found = {
+        tuple(sorted(row.provenance.record.packages.items())) for row in page.rows if row.provenance.record
+    }
+    return "; or ".join(", ".join(f"{k} {v}" for k, v in packages) for packages in sorted(found))
 
 
 def _commands(page: ResultPage) -> list[str]:

@@ -144,3 +144,11 @@ def test_a_file_in_the_place_of_a_record_is_named(finished, tmp_path, content, m
     (tmp_path / "test" / "zero.json").write_text(content)
     with pytest.raises(DatasetError, match=f"zero.json .*{message}"):
         make_page(finished)
+
+
+def test_versions_stand_in_a_fixed_order_where_rows_differ(finished, tmp_path):
+    path = tmp_path / "test" / "zero.json"
+    record = json.loads(path.read_text())
+    path.write_text(json.dumps({**record, "packages": {"mujoco": "3.0", "lerobot": "0.6.1"}}))
+    text = page_text(make_page(finished))
+    assert "- Versions: lerobot 0.6.1, mujoco 3.0; or lerobot 0.6.1, mujoco 4.0.\n" in text
