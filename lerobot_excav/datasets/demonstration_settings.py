@@ -113,7 +113,10 @@ class DemonstrationSettings:
             ConfigurationError: There is no such environment, or a field is not possible in it.
         """
         absent: dict[str, Any] = dict.fromkeys(EXTRA_SETTINGS)
-        return cls(**{"env": env, **absent, **environment_named("--env", env).defaults, **changes})
+        environment = environment_named("--env", env)
+        fps = changes.get("fps", environment.fps)
+        defaults = environment.defaults | {"episode_length": environment.length_at(fps)}
+        return cls(**{"env": env, **absent, **defaults, **changes})
 
     @property
     def environment(self) -> EnvironmentDescription:

@@ -50,7 +50,7 @@ class EnvironmentDescription:
         action_limits: Least and greatest value of every element of an action, (2, n).
         task_state_names: Elements of `excav.task_state`.
         fps: Frames per second by default.
-        episode_length: Time limit by default [frames].
+        duration_s: Time limit by default [s].
         storage: How pictures are stored by default, one of `storage.STORAGES`.
         settings: Settings that not every environment has, by name.
         simulation_version: Version of the simulation; see `envs.simulation_version`.
@@ -72,7 +72,7 @@ class EnvironmentDescription:
     action_limits: NDArray[Any]
     task_state_names: tuple[str, ...]
     fps: int
-    episode_length: int
+    duration_s: float
     storage: str
     settings: Mapping[str, Setting]
     simulation_version: int
@@ -82,6 +82,10 @@ class EnvironmentDescription:
     summary: Callable[[pd.DataFrame], str]
     rig: RigMaker
     judges_at_the_end: bool
+
+    def length_at(self, fps: int) -> int:
+        """Return the time limit by default at a frame rate [frames]."""
+        return round(self.duration_s * fps)
 
     def replay_length(self, frames: int) -> int:
         """Return the time limit [frames] under which a recording of this length is judged as it was."""
@@ -93,7 +97,7 @@ class EnvironmentDescription:
         return {
             "task": self.tasks[0],
             "fps": self.fps,
-            "episode_length": self.episode_length,
+            "episode_length": self.length_at(self.fps),
             "storage": self.storage,
             **{name: setting.default for name, setting in self.settings.items()},
         }

@@ -10,7 +10,7 @@ from lerobot_excav.datasets.environment import EnvironmentDescription, Setting
 from lerobot_excav.datasets.rig import ExcavatorRig
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
 from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
-from lerobot_excav.envs.settings import FIDELITIES, SOILS
+from lerobot_excav.envs.settings import EPISODE_DURATION_S, FIDELITIES, SOILS
 from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION
 
 
@@ -41,7 +41,7 @@ EXCAVATOR = EnvironmentDescription(
     action_limits=np.tile([[-1.0], [1.0]], len(ACTION_NAMES)),
     task_state_names=TASK_STATE_NAMES,
     fps=10,
-    episode_length=200,
+    duration_s=EPISODE_DURATION_S,
     storage="image",
     settings={
         # The first version did not write these columns.

@@ -14,6 +14,7 @@ from lerobot_excav.envs.fr5.scene import draw_scene
 from lerobot_excav.envs.fr5.simulation_version import CHANGES, SIMULATION_VERSION
 from lerobot_excav.envs.fr5.task import TASK_STATE_NAMES
 from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW
+from lerobot_excav.envs.settings import FR5_EPISODE_DURATION_S
 
 
 def fr5_grasp_outcome(task_state: NDArray[Any]) -> dict[str, Any]:
@@ -41,7 +42,7 @@ FR5_GRASP = EnvironmentDescription(
     action_limits=np.stack([ACTION_LOW, ACTION_HIGH]),
     task_state_names=TASK_STATE_NAMES,
     fps=50,
-    episode_length=400,
+    duration_s=FR5_EPISODE_DURATION_S,
     storage="video",
     settings={},
     simulation_version=SIMULATION_VERSION,

@@ -21,7 +21,7 @@ class GraspEpisode(Episode):
         retarget_frame: Frame at which the command changed; None if it did not.
         episode_return: Sum of the rewards.
         first_grasped_block: First block that the fingers lifted; -1 if they lifted none.
-        shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none.
+        shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none, None if there was no mask.
         target_in_tray: Whether the commanded block rests in the tray.
         blocks_in_tray: How many blocks do.
     """
@@ -30,7 +30,7 @@ class GraspEpisode(Episode):
     retarget_frame: int | None
     episode_return: float
     first_grasped_block: int
-    shown_block: int
+    shown_block: int | None
     target_in_tray: bool
     blocks_in_tray: int
 
@@ -54,7 +54,7 @@ class GraspEpisode(Episode):
     @property
     def mask_followed(self) -> bool | None:
         """Of episodes that grasped a block and whose mask showed one: whether they are the same."""
-        if not self.has_grasped or self.shown_block == NO_BLOCK:
+        if not self.has_grasped or self.shown_block in (None, NO_BLOCK):
             return None
         return self.first_grasped_block == self.shown_block
 

@@ -77,6 +77,12 @@ def test_defaults_are_those_of_the_environment():
     assert (arm.soil, arm.fidelity) == (None, None)
 
 
+@pytest.mark.parametrize(("env", "fps", "frames"), [("fr5_grasp", 25, 200), ("excavator", 5, 100)])
+def test_an_episode_lasts_as_long_at_another_frame_rate(env, fps, frames):
+    assert DemonstrationSettings.of(env, fps=fps).episode_length == frames
+    assert DemonstrationSettings.of(env, fps=fps, episode_length=7).episode_length == 7
+
+
 def test_stored_settings_without_later_choices_are_what_was_done_then():
     record = DemonstrationSettings(targets=1).as_record()
     del record["target_rule"], record["storage"]

@@ -91,8 +91,6 @@ def _add_capsule(
 
 
 def _add_servo(spec: mujoco.MjSpec, i: int, name: str) -> None:
-    torque = const.JOINT_TORQUE_N_M[i]
     servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     servo.set_to_position(kp=const.JOINT_STIFFNESS[i], kv=const.JOINT_DAMPING[i])
     servo.ctrllimited, servo.ctrlrange = True, const.JOINT_LIMITS_RAD[i]
-    servo.forcelimited, servo.forcerange = True, [-torque, torque]

@@ -235,7 +235,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         return int(rng.choice([i for i in range(BLOCK_COUNT) if i != self.target_id]))
 
     def _draw_mask(self) -> None:
-        self._shown_block = NO_BLOCK
+        self._shown_block: float = np.nan  # null in the file
         if self.obs_type != "pixels_agent_pos":
             return
         masks = self.renderer.block_masks()

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.fr5 import constants as const
 from lerobot_excav.envs.fr5 import layout
+from lerobot_excav.envs.fr5.geoms import ARM
 from lerobot_excav.envs.fr5.mjcf import build_model
 from lerobot_excav.envs.fr5.scene import GraspScene
 from lerobot_excav.errors import ConfigurationError, ExcavError
@@ -24,6 +25,9 @@ _REFERENCE_STEP = const.SUBSTEP_S * np.append(
     const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M
 )
 """How far the servos' reference may move in a substep: the speed limits [rad, 1]."""
+_REFERENCE_LEAD_RAD = np.array(const.JOINT_DAMPING) / const.JOINT_STIFFNESS * const.JOINT_SPEED_RAD_S
+"""How far it may be ahead of a joint: there the servo's stiffness and damping balance at the speed limit [rad]. Without
+this a joint that could not follow would catch up at several times that speed."""
 
 
 class Workcell:
@@ -89,10 +93,7 @@ class Workcell:
             )
         target = np.clip(action, ACTION_LOW, ACTION_HIGH)
         for _ in range(_SUBSTEPS):
-            self._reference = self._reference + np.clip(
-                target - self._reference, -_REFERENCE_STEP, _REFERENCE_STEP
-            )
-            self.data.ctrl[:] = self._reference * _CTRL_SCALE
+            self._lead_to(target)
             mujoco.mj_step(self.model, self.data)
         if self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
             raise ExcavError(
@@ -147,6 +148,24 @@ class Workcell:
                 if pad in self._pads and block in self._block_geoms:
                     touching[self._pads[pad], self._block_geoms[block]] = True
         return touching
+
+    def arm_touching(self) -> NDArray[np.bool_]:
+        """Return which blocks any part of arm or gripper touches, (4,)."""
+        touching = np.zeros(layout.BLOCK_COUNT, dtype=bool)
+        for pair in self.data.contact.geom[: self.data.ncon]:
+            for part, block in (pair, pair[::-1]):
+                if block in self._block_geoms and self.model.geom_group[part] == ARM.group:
+                    touching[self._block_geoms[block]] = True
+        return touching
+
+    def _lead_to(self, target: NDArray[np.float64]) -> None:
+        """Move the servos' reference towards a target, within what the speed limits allow."""
+        step = np.clip(target - self._reference, -_REFERENCE_STEP, _REFERENCE_STEP)
+        self._reference = self._reference + step
+        joint_pos = self.data.qpos[self._qpos[:6]]
+        low, high = joint_pos - _REFERENCE_LEAD_RAD, joint_pos + _REFERENCE_LEAD_RAD
+        self._reference[:6] = np.clip(self._reference[:6], low, high)
+        self.data.ctrl[:] = self._reference * _CTRL_SCALE
 
     def _paint(self, scene: GraspScene) -> None:
         for i, rgb in enumerate(scene.block_rgb):

@@ -90,3 +90,18 @@ def test_joints_turn_no_faster_than_the_datasheet_allows(workcell):
         fastest = np.maximum(fastest, np.abs(workcell.joint_vel))
     assert fastest[0] > 0.9 * const.JOINT_SPEED_RAD_S[0]
     assert (fastest < 1.05 * const.JOINT_SPEED_RAD_S).all()
+
+
+def test_a_joint_that_was_held_back_does_not_catch_up_beyond_its_speed_limit(workcell):
+    """Wild commands saturate the torque; a reference that ran ahead meanwhile would be chased far too fast."""
+    workcell.reset(SCENE)
+    rng = np.random.default_rng(0)
+    raised = SCENE.joint_pos.copy()
+    fastest = np.zeros(6)
+    for _ in range(40):
+        target = np.clip(raised + rng.uniform(-1.5, 1.5, 6), *const.JOINT_LIMITS_RAD.T)
+        target[1:3] = raised[1:3] + rng.uniform(-0.3, 0.3, 2)  # high above the table
+        for _ in range(3):
+            workcell.tick(np.append(target, 1.0))
+            fastest = np.maximum(fastest, np.abs(workcell.joint_vel))
+    assert (fastest < 1.25 * const.JOINT_SPEED_RAD_S).all()

@@ -121,6 +121,12 @@ def test_conditions_corrupt_the_mask():
     assert any(np.array_equal(shown["mismatched"], right[i]) for i in (0, 2, 3))
 
 
+def test_without_pictures_no_block_is_shown():
+    env = FR5GraspEnv(obs_type="agent_pos", episode_length=1)
+    env.reset(seed=0)
+    assert np.isnan(env.step(hold(env))[4]["episode_metrics"]["shown_block"])
+
+
 @pytest.mark.parametrize("condition", ["correct", "zero", "random", "mismatched"])
 def test_metrics_name_the_block_whose_mask_is_shown(condition):
     env = FR5GraspEnv(mask_condition=condition, episode_length=1)

@@ -62,12 +62,28 @@ def test_a_second_block_in_the_tray_spoils_the_success(task, workcell):
 def test_a_block_in_the_tray_that_a_finger_touches_is_not_released(task, workcell, monkeypatch):
     put(workcell, 1, IN_TRAY)
     hold(workcell)
-    touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
-    touching[0, 1] = True
-    monkeypatch.setattr(workcell, "fingers_touching", lambda: touching)
+    # By any part of the gripper: pads, rods or hand.
+    monkeypatch.setattr(workcell, "arm_touching", lambda: np.arange(layout.BLOCK_COUNT) == 1)
     assert task.update() == 0.0
     assert not task.is_success
     assert not task.episode_metrics["released"]
+
+
+def test_another_block_that_still_moves_in_the_tray_spoils_the_success(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (-0.03, 0, 0)))
+    hold(workcell)
+    put(workcell, 3, np.add(IN_TRAY, (0.03, 0, 0.05)))
+    workcell.tick(np.append(SCENE.joint_pos, 1.0))
+    assert task.update() == 4.0
+    assert task.episode_metrics["blocks_in_tray"] == 1
+    assert not task.is_success
+
+
+def test_a_block_on_the_rim_is_not_in_the_tray(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (0.077, 0, layout.TRAY_RIM_M)))
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
 
 
 @pytest.mark.parametrize("offset", [(-layout.TRAY_RADIUS_M - 0.01, 0, 0), (0, 0, layout.BLOCK_SIZE_M)])
