@@ -171,7 +171,8 @@ def _trainings(page: ResultPage) -> list[str]:
         return []
     header = ("training", "data", "demonstrations", "steps", "batch", "samples", "minutes", "seed", "commit")
     rows = [_training(training) for training in page.trainings]
-    return ["## Training", "", *markdown_table(header, rows), ""]
+    note = "Minutes of wall time, with whatever else ran beside: another training, where two stages were run at a time."
+    return ["## Training", "", *markdown_table(header, rows), "", note, ""]
 
 
 def _training(training: Training) -> list[str]:
@@ -231,7 +232,10 @@ def _commands(page: ResultPage) -> list[str]:
     by_hand += [
         f"{row.row.label} (seed {_or_dash(row.seed)})" for row in page.rows if row.provenance.record is None
     ]
+    note = (
+        "A command works on a folder `….partial`, which has lost that ending once the command had succeeded."
+    )
     return [
-        *(["## Commands", "", "```bash", *parts[:-1], "```", ""] if parts else []),
+        *(["## Commands", "", note, "", "```bash", *parts[:-1], "```", ""] if parts else []),
         *([f"Run by hand, without a record of the command: {', '.join(by_hand)}.", ""] if by_hand else []),
     ]
