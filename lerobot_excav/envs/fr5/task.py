@@ -47,8 +47,8 @@ class GraspTask:
     | 1 | both fingers touch it |
     | 0 | anything else |
 
-    The published experiment has the same maximum; its policies return 658 (96 % success) and 704 (50 of 50). The scripted
-    operator's 400 frames return about 900 here, because it rests longer at the end.
+    The published experiment has the same maximum; its policies return 658 (96 % success) and 704 (50 of 50). The
+    scripted operator's 400 frames return about 900 here, because it rests longer at the end.
 
     Args:
         workcell: Arm and blocks, already reset to the scene.
