@@ -9,8 +9,8 @@ from lerobot_excav.datasets.environments import ENVIRONMENTS, environment_named
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.storage import STORAGES
 from lerobot_excav.datasets.target_rule import TARGET_RULES, targets_of_scene
+from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
 from lerobot_excav.envs.settings import SCENE_SETS, TARGETS_PER_SCENE, require_fps, require_image_size
-from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 EXTRA_SETTINGS = tuple(dict.fromkeys(name for known in ENVIRONMENTS.values() for name in known.settings))

@@ -53,7 +53,7 @@ class EnvironmentDescription:
         duration_s: Time limit by default [s].
         storage: How pictures are stored by default, one of `storage.STORAGES`.
         settings: Settings that not every environment has, by name.
-        simulation_version: Version of the simulation; see `envs.simulation_version`.
+        simulation_version: Version of the simulation; see its `simulation_version.py`.
         changes: What each of its versions is, or changed.
         nearest_target: Returns the target that a scene (set and number) offers as the nearest one; None if the
             environment defines no such thing.

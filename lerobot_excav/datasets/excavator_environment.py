@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from lerobot_excav.datasets.environment import EnvironmentDescription, Setting
 from lerobot_excav.datasets.rig import ExcavatorRig
+from lerobot_excav.envs.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.excavator.simulation_version import CHANGES, SIMULATION_VERSION
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
-from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.settings import EPISODE_DURATION_S, FIDELITIES, SOILS
-from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION
 
 
 def excavator_outcome(task_state: NDArray[Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from lerobot_excav.datasets.environment import EnvironmentDescription
 from lerobot_excav.datasets.storage import require_lossless
-from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
+from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 STATE_KEY = "observation.state"

@@ -10,7 +10,7 @@ from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.environments import environment_named
 from lerobot_excav.datasets.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.envs.simulation_version import UNMARKED_VERSION
+from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 _ENDLESS_FRAMES = 2**31 - 1  # the person with the joystick, not the environment, ended the episode

@@ -6,7 +6,7 @@ from typing import Any, override
 from lerobot.envs.configs import EnvConfig
 
 from lerobot_excav.envs.configuration_simulation import SimulationEnvConfig
-from lerobot_excav.envs.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.settings import EXCAVATOR_TASKS, FIDELITIES, SOILS
 from lerobot_excav.errors import require_choice
 

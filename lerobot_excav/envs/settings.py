@@ -56,7 +56,7 @@ def require_retarget_frame(field: str, frame: int | None, episode_length: int) -
         require_integer(field, frame, 1, episode_length - 1, hint=hint)
 
 
-def require_task(field: str, task: str | None) -> None:
+def require_excavator_task(field: str, task: str | None) -> None:
     """Raise unless the task is one of the excavator.
 
     Raises:

@@ -13,7 +13,7 @@ from lerobot_excav.datasets.paired_index import INDEX_PATH, build_index, write_i
 from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
 from lerobot_excav.datasets.storage import STORAGES
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError
 
 

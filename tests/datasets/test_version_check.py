@@ -13,7 +13,7 @@ from lerobot_excav.datasets.paired_index import build_index, write_index
 from lerobot_excav.datasets.quality_check import check_dataset
 from lerobot_excav.datasets.schema import unmarked_columns
 from lerobot_excav.datasets.version_check import require_one_version, versions_of
-from lerobot_excav.envs.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
+from lerobot_excav.envs.excavator.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.scripts.main import main
 

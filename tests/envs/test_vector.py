@@ -19,9 +19,9 @@ from lerobot.scripts.lerobot_eval import eval_policy
 
 from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.configuration_fr5_grasp import FR5GraspEnvConfig
+from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION as FR5_SIMULATION_VERSION
 from lerobot_excav.envs.metrics_log import MetricsLog
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.vector import info_of_env, make_vector_env
 from lerobot_excav.errors import ConfigurationError
 

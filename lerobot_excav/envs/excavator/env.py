@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.excavator.control import checked_action
 from lerobot_excav.envs.excavator.cycle import DigCycle
+from lerobot_excav.envs.excavator.features import CAMERAS, STATE_NAMES
 from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.excavator.scene import Scene, draw_scene
+from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.excavator.targets import Target, target_mask_img
 from lerobot_excav.envs.excavator.worksite import Worksite
-from lerobot_excav.envs.features import CAMERAS, STATE_NAMES
 from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.mask_noise import noisy_mask
 from lerobot_excav.envs.observation import OBS_TYPES, observation_space
@@ -27,12 +28,11 @@ from lerobot_excav.envs.settings import (
     TARGETS_PER_SCENE,
     TICKS_PER_SECOND,
     require_episode_length,
+    require_excavator_task,
     require_fps,
     require_image_size,
     require_mask_noise,
-    require_task,
 )
-from lerobot_excav.envs.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, require_choice
 
 TASK_DESCRIPTION = "Dig where the mask points, carry the soil to the box and dump it there."
@@ -107,7 +107,7 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         render_mode: str | None = "rgb_array",
         depth_info: bool = False,
     ) -> None:
-        require_task("task", task)
+        require_excavator_task("task", task)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)

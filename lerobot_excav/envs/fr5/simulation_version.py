@@ -1,4 +1,4 @@
-"""The version of the arm's simulation; see `lerobot_excav.envs.simulation_version`, which counts the excavator's.
+"""The version of the arm's simulation; what counts as a change is said in `envs.excavator.simulation_version`.
 
 Each environment counts its own, so that a change of the soil makes no recording of the arm unusable.
 """

@@ -1,7 +1,8 @@
-"""The version of the simulation: recorded actions lead to the recorded states again in the version that made them only.
+"""The version of the excavator's simulation.
 
-It counts changes of soil, machine, scenes or targets after which a replay deviates, or a scene's number means another
-scene. Speed, pictures and policies are not part of it: a checkpoint runs in every version.
+Recorded actions lead to the recorded states again in the version that made them only. It counts changes of soil,
+machine, scenes or targets after which a replay deviates, or a scene's number means another scene. Speed, pictures and
+policies are not part of it: a checkpoint runs in every version.
 """
 
 SIMULATION_VERSION = 2
