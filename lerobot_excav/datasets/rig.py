@@ -1,7 +1,9 @@
 """Where demonstrations come from: an environment and an operator for given settings."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -24,8 +26,8 @@ class Rig(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExcavatorRig:
-    """The excavator and its scripted operator.
+class SimulationRig(ABC):
+    """An environment of this package and its scripted operator.
 
     Attributes:
         with_images: Whether the environment draws pictures; without them it is several times faster.
@@ -34,11 +36,9 @@ class ExcavatorRig:
     with_images: bool = True
 
     def environment(self, settings: "DemonstrationSettings") -> Environment:
-        """Make the excavator environment."""
-        # Imported here: only who plays an episode needs the graphics libraries.
-        from lerobot_excav.envs.excavator.env import ExcavatorEnv
-
-        return ExcavatorEnv(
+        """Make the environment."""
+        make, _ = self._classes()
+        env: Environment = make(
             task=settings.task,
             obs_type="pixels_agent_pos" if self.with_images else "agent_pos",
             observation_height=settings.height,
@@ -49,41 +49,34 @@ class ExcavatorRig:
             render_mode="rgb_array" if self.with_images else None,
             **settings.extra,
         )
+        return env
 
     def operator(self, rng: np.random.Generator) -> Operator:
         """Make the scripted operator."""
+        _, make = self._classes()
+        operator: Operator = make(rng=rng)
+        return operator
+
+    @abstractmethod
+    def _classes(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
+        """Return the classes of environment and operator; imported late, as they need the graphics libraries."""
+
+
+class ExcavatorRig(SimulationRig):
+    """The excavator and its scripted operator."""
+
+    def _classes(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
+        from lerobot_excav.envs.excavator.env import ExcavatorEnv
         from lerobot_excav.envs.excavator.operator import ScriptedOperator
 
-        return ScriptedOperator(rng=rng)
+        return ExcavatorEnv, ScriptedOperator
 
 
-@dataclass(frozen=True, kw_only=True)
-class FR5GraspRig:
-    """The arm over a table with blocks, and its scripted operator.
+class FR5GraspRig(SimulationRig):
+    """The arm over a table with blocks, and its scripted operator."""
 
-    Attributes:
-        with_images: Whether the environment draws pictures; without them it is several times faster.
-    """
-
-    with_images: bool = True
-
-    def environment(self, settings: "DemonstrationSettings") -> Environment:
-        """Make the grasping environment."""
+    def _classes(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
         from lerobot_excav.envs.fr5.env import FR5GraspEnv
-
-        return FR5GraspEnv(
-            task=settings.task,
-            obs_type="pixels_agent_pos" if self.with_images else "agent_pos",
-            observation_height=settings.height,
-            observation_width=settings.width,
-            scene_set=settings.scene_set,
-            fps=settings.fps,
-            episode_length=settings.episode_length,
-            render_mode="rgb_array" if self.with_images else None,
-        )
-
-    def operator(self, rng: np.random.Generator) -> Operator:
-        """Make the scripted operator."""
         from lerobot_excav.envs.fr5.operator import ScriptedOperator
 
-        return ScriptedOperator(rng=rng)
+        return FR5GraspEnv, ScriptedOperator
