@@ -136,8 +136,8 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
             or that of another run of the experiment, with the curves where they lie seen from the file's folder.
 
     Raises:
-        ConfigurationError: The file is missing or damaged, a key is unknown or missing, a row occurs twice, or a
-            reference is no row.
+        ConfigurationError: The file is missing or damaged, a key is unknown or missing, a row or a
+            curve occurs twice, or a reference is no row.
     """
     try:
         content = tomllib.loads(path.read_text())
@@ -182,6 +182,10 @@ def _check(contents: Contents, place: str) -> None:
     labels = [row.label for row in contents.rows]
     twice = sorted({label for label in labels if labels.count(label) > 1})
     require(not twice, f"{place}: {twice} stands on the page twice")
+    # A page keeps the metrics of a curve by the name of its folder.
+    folders = [Path(curve.folder).name for curve in contents.curve]
+    twice = sorted({name for name in folders if folders.count(name) > 1})
+    require(not twice, f"{place}: {twice} are the folders of two curves; name each folder once")
     named = [section.reference for section in contents.section if section.reference is not None]
     for label in [*named, *(clips.label for clips in contents.clips)]:
         require(label in labels, f"{place}: {label!r} is no row; allowed: {', '.join(labels)}")

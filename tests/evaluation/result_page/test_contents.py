@@ -24,6 +24,7 @@ def read(tmp_path):
         (f'[[section]]\ntitle = "s"\nrows = [{ROW}, {ROW}]', r"\['a'\] stands on the page twice"),
         (f'[[section]]\ntitle = "s"\nreference = "b"\nrows = [{ROW}]', "'b' is no row; allowed: a"),
         ('[[clips]]\nlabel = "b"\nepisodes = [1]', "'b' is no row"),
+        ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
         ("[[", "is no TOML"),
     ],
 )
