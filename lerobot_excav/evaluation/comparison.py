@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.evaluation.episode import EpisodeKey
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, paired_bootstrap
+from lerobot_excav.evaluation.statistics import (
+    Interval,
+    mcnemar_exact,
+    newcombe_interval,
+    paired_bootstrap,
+)
 from lerobot_excav.evaluation.task_table import Column, Kind
 
 
@@ -19,7 +24,8 @@ class Difference:
 
     Attributes:
         measure: Field of the task's `Episode`.
-        difference: Second minus first, over scenes and targets.
+        difference: Second minus first, over scenes and targets; with Newcombe's interval where there is a p-value, else
+            with the bootstrap's.
         p_value: McNemar's exact test; None for measures that are no rates, or with several seeds, whose episodes on
             one scene are not independent.
     """
@@ -90,13 +96,19 @@ def _mean(run: Run, key: EpisodeKey, measure: str) -> float:
 
 def _difference(column: Column, first: Run, second: Run, rng: np.random.Generator) -> Difference:
     values = means_by_key(first, column.field), means_by_key(second, column.field)
-    testable = column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1
-    p_value = None
-    if testable:
-        only_first = int(np.sum((values[0] == 1) & (values[1] == 0)))
-        only_second = int(np.sum((values[0] == 0) & (values[1] == 1)))
-        p_value = mcnemar_exact(only_first, only_second)
-    return Difference(measure=column.field, difference=paired_bootstrap(*values, rng), p_value=p_value)
+    if column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1:
+        return _difference_of_rates(column.field, *(outcomes == 1.0 for outcomes in values))
+    return Difference(measure=column.field, difference=paired_bootstrap(*values, rng), p_value=None)
+
+
+def _difference_of_rates(measure: str, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Difference:
+    both, neither = int(np.sum(first & second)), int(np.sum(~first & ~second))
+    first_only, second_only = int(np.sum(first & ~second)), int(np.sum(~first & second))
+    return Difference(
+        measure=measure,
+        difference=newcombe_interval(both, first_only, second_only, neither),
+        p_value=mcnemar_exact(first_only, second_only),
+    )
 
 
 def matched(run: Run, reference: Run, measure: str) -> NDArray[Any]:

@@ -30,7 +30,8 @@ def _legend(report: Report) -> list[str]:
     ]
     if report.differences:
         lines.append(
-            "Differences are paired by scene and target; p from McNemar's exact test (single seeds only)."
+            "Differences are paired by scene and target; those of rates with Newcombe's interval and p from McNemar's "
+            "exact test (single seeds only), others with the bootstrap's interval."
         )
     return [*lines, *report.notes]
 

@@ -142,6 +142,47 @@ def paired_bootstrap(
     return bootstrap_mean(second - first, rng, confidence=confidence, resamples=resamples)
 
 
+def newcombe_interval(both: int, first_only: int, second_only: int, neither: int) -> Interval:
+    """Estimate the difference `second - first` of two success rates on the same scenes with a 95 % score interval.
+
+    Method 10 of R. G. Newcombe, Stat. Med. 17 (1998) 2635-2650: Wilson's intervals of the two rates, put together with
+    regard to their correlation. Unlike a bootstrap it keeps its width where all scenes differ alike, or none does.
+
+    Args:
+        both: Scenes on which both succeed.
+        first_only: Scenes on which only the first succeeds.
+        second_only: Scenes on which only the second succeeds.
+        neither: Scenes on which none succeeds.
+
+    Raises:
+        ConfigurationError: No scenes, or a negative number of them.
+    """
+    counts = (both, first_only, second_only, neither)
+    require(min(counts) >= 0, f"counts must not be negative: {counts}")
+    n = sum(counts)
+    first, second = wilson_interval(both + first_only, n), wilson_interval(both + second_only, n)
+    phi = _cautious_correlation(*counts)
+
+    def together(a: float, b: float) -> float:
+        return math.sqrt(a * a - 2.0 * phi * a * b + b * b)
+
+    difference = (second_only - first_only) / n
+    below = together(second.estimate - second.low, first.high - first.estimate)
+    above = together(second.high - second.estimate, first.estimate - first.low)
+    return Interval(estimate=difference, low=max(-1.0, difference - below), high=min(1.0, difference + above))
+
+
+def _cautious_correlation(both: int, first_only: int, second_only: int, neither: int) -> float:
+    """Correlate two truth values, a positive correlation corrected for continuity; 0 where one never changes."""
+    n = both + first_only + second_only + neither
+    excess = both * neither - first_only * second_only
+    if excess > 0:
+        excess = max(0.0, excess - n / 2)
+    firsts, seconds = both + first_only, both + second_only
+    spread = math.sqrt(firsts * (n - firsts) * seconds * (n - seconds))
+    return excess / spread if spread else 0.0
+
+
 def mcnemar_exact(first_only: int, second_only: int) -> float:
     """Test whether two success rates on the same scenes are equal.
 

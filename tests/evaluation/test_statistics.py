@@ -10,6 +10,7 @@ from lerobot_excav.evaluation.statistics import (
     bootstrap_mean,
     bootstrap_ratio,
     mcnemar_exact,
+    newcombe_interval,
     paired_bootstrap,
     wilson_interval,
 )
@@ -63,6 +64,47 @@ def test_mcnemar_is_the_two_sided_binomial_test(first, second, p):
     assert mcnemar_exact(second, first) == mcnemar_exact(first, second)
 
 
+@pytest.mark.parametrize(
+    ("counts", "low", "high"),
+    [
+        # D. G. Altman et al., Statistics with Confidence (2000), table 6.2 (R package biostatUZH has the same example).
+        ((14, 5, 0, 22), 0.011, 0.226),
+        # M. W. Fagerland et al., Statistical Analysis of Contingency Tables (2017), chapter 8: two trials.
+        ((1, 1, 7, 12), -0.507, -0.026),
+        ((59, 6, 16, 80), -0.119, -0.005),
+    ],
+)
+def test_newcombe_interval_reproduces_published_values(counts, low, high):
+    both, here, there, neither = counts  # published as here minus there
+    interval = newcombe_interval(both, there, here, neither)
+    assert interval.estimate == pytest.approx((here - there) / sum(counts))
+    assert (interval.low, interval.high) == pytest.approx((low, high), abs=5e-4)
+
+
+@pytest.mark.parametrize("n", [1, 4, 50])
+def test_a_difference_of_all_scenes_is_as_uncertain_as_the_rates_themselves(n):
+    wilson = wilson_interval(n, n)
+    interval = newcombe_interval(0, 0, n, 0)
+    assert (interval.estimate, interval.high) == (1.0, 1.0)
+    assert interval.low == pytest.approx(max(-1.0, 1.0 - math.sqrt(2.0) * (1.0 - wilson.low)))
+
+
+@pytest.mark.parametrize("counts", [(50, 0, 0, 0), (0, 0, 0, 50), (25, 0, 0, 25), (1, 0, 0, 0)])
+def test_runs_that_never_differ_are_not_certain_to_be_equal(counts):
+    interval = newcombe_interval(*counts)
+    assert interval.low == pytest.approx(-interval.high)
+    assert interval.low < -0.03 < interval.estimate == 0.0
+
+
+@given(counts=st.tuples(*4 * [st.integers(0, 60)]).filter(any))
+def test_newcombe_interval_holds_the_estimate_and_mirrors(counts):
+    both, first_only, second_only, neither = counts
+    interval, mirrored = newcombe_interval(*counts), newcombe_interval(both, second_only, first_only, neither)
+    assert -1.0 <= interval.low <= interval.estimate <= interval.high <= 1.0
+    assert interval.low < interval.high
+    assert interval.low == pytest.approx(-mirrored.high)
+
+
 def test_bootstrap_of_a_mean_agrees_with_the_normal_interval_for_many_values(rng):
     values = rng.normal(10.0, 2.0, 2000)
     interval = bootstrap_mean(values, rng)
@@ -112,6 +154,8 @@ def test_pairing_removes_the_spread_between_scenes(rng):
         lambda rng: bootstrap_ratio(np.ones(2), np.zeros(2), rng),
         lambda rng: paired_bootstrap(np.ones(2), np.ones(3), rng),
         lambda rng: mcnemar_exact(-1, 2),
+        lambda rng: newcombe_interval(0, 0, 0, 0),
+        lambda rng: newcombe_interval(5, -1, 2, 0),
     ],
 )
 def test_impossible_inputs_are_refused(call, rng):

@@ -199,7 +199,8 @@ def _legend(page: ResultPage) -> list[str]:
         "Brackets: 95 % intervals; Wilson's for rates over episodes, bootstrap for means over scenes and targets "
         f"(seed {page.bootstrap_seed}).",
         *page.rows[0].summary.table.legend(None),
-        "Differences are paired by scene and target, on the scenes that both have played; p from McNemar's exact test.",
+        "Differences are paired by scene and target, on the scenes that both have played; with Newcombe's interval for "
+        "paired rates, p from McNemar's exact test.",
         "One training seed per policy: the intervals say nothing about how trainings differ.",
         f"Simulation: {simulations([row.summary for row in page.rows])}.",
         "Machine-readable: [report.json](report.json), a line per row in [rows.jsonl](rows.jsonl); every episode: "
