@@ -9,8 +9,14 @@ from lerobot_excav.datasets.environments import ENVIRONMENTS, environment_named
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.datasets.storage import STORAGES
 from lerobot_excav.datasets.target_rule import TARGET_RULES, targets_of_scene
-from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
-from lerobot_excav.envs.settings import SCENE_SETS, TARGETS_PER_SCENE, require_fps, require_image_size
+from lerobot_excav.envs.settings import (
+    LAST_SCENE,
+    SCENE_SETS,
+    TARGETS_PER_SCENE,
+    require_fps,
+    require_image_size,
+    require_integer,
+)
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 EXTRA_SETTINGS = tuple(dict.fromkeys(name for known in ENVIRONMENTS.values() for name in known.settings))
@@ -71,7 +77,7 @@ class DemonstrationSettings:
         require_choice("--storage", self.storage, STORAGES)
         require_choice("--targets", self.targets, range(1, TARGETS_PER_SCENE + 1))
         require(self.scenes >= 1, f"--scenes={self.scenes} must be at least 1")
-        require(self.first_scene >= 0, f"--first-scene={self.first_scene} must not be negative")
+        require_integer("--first-scene", self.first_scene, 0, LAST_SCENE)
         require(self.seed >= 0, f"--seed={self.seed} must not be negative")
         require(self.episode_length >= 1, f"--episode-length={self.episode_length} must be at least 1 frame")
         self._require_extra_settings()
@@ -167,8 +173,9 @@ class DemonstrationSettings:
             ConfigurationError: It belongs to another version of the simulation, or a field is missing or unknown.
         """
         values = {**_ADDED_LATER, **record}
-        version = values.pop("simulation_version", UNMARKED_VERSION)
-        current = environment_named(f"env in {source}", record.get("env", "")).simulation_version
+        environment = environment_named(f"env in {source}", record.get("env", ""))
+        version = values.pop("simulation_version", environment.unmarked_version)
+        current = environment.simulation_version
         require(
             version == current,
             f"{source} is of version {version} of the simulation, and this is version {current}; "

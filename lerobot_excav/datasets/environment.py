@@ -1,7 +1,7 @@
 """What demonstrations and datasets need to know of an environment, gathered in one place per environment.
 
-`environments` lists them. Whatever differs between environments is asked for here, so that no other file of this
-package names one.
+`environments` lists them. Whatever differs between environments is asked for here or made by their rigs; elsewhere in
+this package the excavator is named only where it is the default, or where its first, unmarked data are read.
 """
 
 from collections.abc import Callable, Mapping
@@ -55,11 +55,13 @@ class EnvironmentDescription:
         settings: Settings that not every environment has, by name.
         simulation_version: Version of the simulation; see its `simulation_version.py`.
         changes: What each of its versions is, or changed.
+        unmarked_version: Version that data without one are taken to be of; None if all of its data say theirs.
         nearest_target: Returns the target that a scene (set and number) offers as the nearest one; None if the
             environment defines no such thing.
         outcome: Turns the task states of an episode, (n, k), into columns of the index.
         summary: Describes the outcomes of an index in a few words.
         rig: Makes environment and operator.
+        task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
     """
 
@@ -77,10 +79,12 @@ class EnvironmentDescription:
     settings: Mapping[str, Setting]
     simulation_version: int
     changes: Mapping[int, str]
+    unmarked_version: int | None
     nearest_target: Callable[[str, int], int] | None
     outcome: Callable[[NDArray[Any]], dict[str, Any]]
     summary: Callable[[pd.DataFrame], str]
     rig: RigMaker
+    task_state_tolerance: float
     judges_at_the_end: bool
 
     def length_at(self, fps: int) -> int:

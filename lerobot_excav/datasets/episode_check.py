@@ -13,6 +13,11 @@ FIRST_IMAGE_TOLERANCE = 2
 """Grey levels by which the first pictures of a scene may differ; graphics cards round differently (guess)."""
 
 
+ACTION_MARGIN = 0.1
+"""Share of its range by which an action may lie outside of it: `lerobot-rollout` records what the policy asked for, and
+environments clip it. More speaks of another unit (guess)."""
+
+
 def episode_problems(episode: EpisodeTable) -> list[str]:
     """Describe what is wrong with an episode.
 
@@ -40,8 +45,8 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
     for name, values, low, high in zip(
         names, episode.action.T, *episode.environment.action_limits, strict=True
     ):
-        # Compared as they are stored: a limit may be rounded up.
-        outside = values[(values < np.float32(low)) | (values > np.float32(high))]
+        margin = ACTION_MARGIN * (high - low)
+        outside = values[(values < low - margin) | (values > high + margin)]
         if outside.size:
             worst = outside[np.argmax(np.abs(outside))]
             yield f"action {name} reaches {worst:.3g}; allowed are {low:.3g} to {high:.3g}"

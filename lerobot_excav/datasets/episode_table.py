@@ -97,6 +97,11 @@ class EpisodeTable:
         """
         pair = Pair.parse(self._constant(PAIR_KEY))
         ids = (self._constant(SCENE_KEY), self._constant(TARGET_KEY))
+        if pair.env != self.environment.name:
+            raise DatasetError(
+                f"episode {self.index}: {PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's robot_type is "
+                f"that of {self.environment.name!r}"
+            )
         if ids != (pair.scene_id, pair.target_id):
             raise DatasetError(
                 f"episode {self.index}: scene and target {ids} contradict {PAIR_KEY}={pair.uid!r}"

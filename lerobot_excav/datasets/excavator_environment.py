@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from lerobot_excav.datasets.environment import EnvironmentDescription, Setting
 from lerobot_excav.datasets.rig import ExcavatorRig
 from lerobot_excav.envs.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
-from lerobot_excav.envs.excavator.simulation_version import CHANGES, SIMULATION_VERSION
+from lerobot_excav.envs.excavator.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
 from lerobot_excav.envs.excavator.task_state import TASK_STATE_NAMES
-from lerobot_excav.envs.settings import EPISODE_DURATION_S, FIDELITIES, SOILS
+from lerobot_excav.envs.settings import EXCAVATOR_EPISODE_DURATION_S, FIDELITIES, SOILS
 
 
 def excavator_outcome(task_state: NDArray[Any]) -> dict[str, Any]:
@@ -41,7 +41,7 @@ EXCAVATOR = EnvironmentDescription(
     action_limits=np.tile([[-1.0], [1.0]], len(ACTION_NAMES)),
     task_state_names=TASK_STATE_NAMES,
     fps=10,
-    duration_s=EPISODE_DURATION_S,
+    duration_s=EXCAVATOR_EPISODE_DURATION_S,
     storage="image",
     settings={
         # The first version did not write these columns.
@@ -50,10 +50,12 @@ EXCAVATOR = EnvironmentDescription(
     },
     simulation_version=SIMULATION_VERSION,
     changes=CHANGES,
+    unmarked_version=UNMARKED_VERSION,
     # Dig regions are asked for by the mask alone; the bucket starts far from all of them.
     nearest_target=None,
     outcome=excavator_outcome,
     summary=_summary,
     rig=ExcavatorRig,
+    task_state_tolerance=1e-2,  # [kg], [m], or a count (guess; the same build repeats exactly)
     judges_at_the_end=False,
 )

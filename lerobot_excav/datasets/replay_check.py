@@ -8,9 +8,6 @@ from lerobot_excav.datasets.episode_table import EpisodeTable
 from lerobot_excav.datasets.resimulation import STATE_TOLERANCE
 from lerobot_excav.datasets.rig import Rig
 
-TASK_STATE_TOLERANCE = 1e-2
-"""Allowed deviation of a task state, in its own unit (guess; the same build repeats exactly)."""
-
 
 def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int) -> str:
     """Play an episode again and describe how it deviates.
@@ -41,7 +38,7 @@ def replay_problem(rig: Rig, recorded: EpisodeTable, *, fps: int) -> str:
         frame = int(np.argmax(state > STATE_TOLERANCE))
         return f"replay leaves the recorded state at frame {frame} (up to {state.max():.3g} rad)"
     task = np.abs(played.task_state - recorded.task_state)
-    if task.max() > TASK_STATE_TOLERANCE:
+    if task.max() > recorded.environment.task_state_tolerance:
         name = recorded.environment.task_state_names[int(np.argmax(task.max(axis=0)))]
         return f"replay gives another {name} (by up to {task.max():.3g})"
     if played.success != recorded.success:

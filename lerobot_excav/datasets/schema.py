@@ -10,7 +10,6 @@ from typing import Any
 
 from lerobot_excav.datasets.environment import EnvironmentDescription
 from lerobot_excav.datasets.storage import require_lossless
-from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
 from lerobot_excav.errors import DatasetError
 
 STATE_KEY = "observation.state"
@@ -37,8 +36,10 @@ def setting_key(name: str) -> str:
 
 def unmarked_columns(environment: EnvironmentDescription) -> dict[str, int | str]:
     """Return what is taken to stand in columns that the first version of the simulation did not write."""
+    if environment.unmarked_version is None:
+        return {}
     settings = {setting_key(name): setting.unmarked for name, setting in environment.settings.items()}
-    return {SIMULATION_KEY: UNMARKED_VERSION, **settings}
+    return {SIMULATION_KEY: environment.unmarked_version, **settings}
 
 
 def excav_features(environment: EnvironmentDescription) -> dict[str, Feature]:

@@ -5,15 +5,24 @@ The file is JSON Lines, one object per episode; `robots.session_log` writes it.
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.environments import environment_named
 from lerobot_excav.datasets.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
-from lerobot_excav.errors import DatasetError
+from lerobot_excav.envs.settings import (
+    LAST_SCENE,
+    SCENE_SETS,
+    TARGETS_PER_SCENE,
+    require_fps,
+    require_image_size,
+    require_integer,
+    require_task,
+)
+from lerobot_excav.errors import DatasetError, require, require_choice
 
-_ENDLESS_FRAMES = 2**31 - 1  # the person with the joystick, not the environment, ended the episode
+_ENDLESS_FRAMES = 2**31 - 1  # the recorder, not the environment, ended the episode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,10 +103,11 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
 def _episode(line: Line) -> SessionEpisode:
     # The first version wrote neither its number nor the fidelity, of which it had one only; and only the other
     # environments name themselves.
-    record = {"simulation_version": UNMARKED_VERSION, "env": "excavator", **line.record}
-    if record["simulation_version"] == UNMARKED_VERSION:
-        record.setdefault("fidelity", "standard")
-    known = environment_named(f"{line.place}: env", record["env"]).settings
+    record = {"env": "excavator", **line.record}
+    environment = environment_named(f"{line.place}: env", record["env"])
+    known, unmarked = environment.settings, environment.unmarked_version
+    if unmarked is not None and record.setdefault("simulation_version", unmarked) == unmarked:
+        record = {name: known[name].unmarked for name in ("fidelity",)} | record
     required = ({field.name for field in fields(SessionEpisode)} - {"frames", "restarts", "extra"}) | set(
         known
     )
@@ -106,9 +116,33 @@ def _episode(line: Line) -> SessionEpisode:
         raise DatasetError(
             f"{line.place}: lacks {', '.join(sorted(missing))}; is it a session log of a simulated robot?"
         )
+    _check_values(record, line.place)
     return SessionEpisode(
         **{name: record[name] for name in required - set(known)},
         extra={name: record[name] for name in known},
         frames=record.get("frames"),
         restarts=tuple(record.get("restarts", ())),
     )
+
+
+def _check_values(record: dict[str, Any], place: str) -> None:
+    environment = environment_named(f"{place}: env", record["env"])
+    require_integer(f"{place}: simulation_version", record["simulation_version"], 1)
+    require_integer(f"{place}: episode_index", record["episode_index"], 0)
+    require_task(f"{place}: task", record["task"], environment.tasks)
+    require_choice(f"{place}: scene_set", record["scene_set"], SCENE_SETS)
+    require_integer(f"{place}: scene_id", record["scene_id"], 0, LAST_SCENE)
+    require_integer(f"{place}: target_id", record["target_id"], 0, TARGETS_PER_SCENE - 1)
+    require_fps(f"{place}: fps", record["fps"])
+    for name in ("observation_height", "observation_width"):
+        require_image_size(f"{place}: {name}", record[name])
+    for name, setting in environment.settings.items():
+        require_choice(f"{place}: {name}", record[name], setting.choices)
+    if record.get("frames") is not None:
+        require_integer(f"{place}: frames", record["frames"], 0)
+    restarts = record.get("restarts", [])
+    require(
+        isinstance(restarts, list), f"{place}: restarts={restarts!r} is not possible; give a list of frames"
+    )
+    for frame in restarts:
+        require_integer(f"{place}: restarts", frame, 0)

@@ -12,6 +12,8 @@ from lerobot_excav.errors import DatasetError
 Storage = Literal["image", "video"]
 STORAGES: tuple[Storage, ...] = ("image", "video")
 
+LOSSLESS_CODEC = "h264"
+"""Codec that is lossless at crf=0; at the same value HEVC is not (grey levels of noise off by up to 24)."""
 LOSSLESS_PIX_FMTS = ("yuv444p", "gbrp")
 """Pixel formats that keep every pixel's colour; all others average colours over neighbouring pixels."""
 
@@ -26,10 +28,10 @@ def require_lossless(key: str, info: dict[str, Any]) -> None:
     Raises:
         DatasetError: It was compressed with losses, or its settings are unknown.
     """
-    crf, pix_fmt = info.get("video.crf"), info.get("video.pix_fmt")
-    if crf != 0 or pix_fmt not in LOSSLESS_PIX_FMTS:
+    codec, crf, pix_fmt = (info.get(f"video.{name}") for name in ("codec", "crf", "pix_fmt"))
+    if codec != LOSSLESS_CODEC or crf != 0 or pix_fmt not in LOSSLESS_PIX_FMTS:
         raise DatasetError(
-            f"{key}: dtype='video' with crf={crf} and pix_fmt={pix_fmt!r}, which blurs the mask; needed are crf=0 and "
-            f"pix_fmt one of {', '.join(LOSSLESS_PIX_FMTS)}; record with --dataset.video=false, or with the encoder "
-            "settings of docs/datasets.md"
+            f"{key}: dtype='video' with codec={codec!r}, crf={crf} and pix_fmt={pix_fmt!r}, which blurs the mask; "
+            f"needed are codec={LOSSLESS_CODEC!r}, crf=0 and pix_fmt one of {', '.join(LOSSLESS_PIX_FMTS)}; record "
+            "with --dataset.video=false, or with the encoder settings of docs/datasets.md"
         )

@@ -20,6 +20,8 @@ from lerobot_excav.envs.settings import (
     require_image_size,
     require_integer,
     require_mask_noise,
+    require_noise_effect,
+    require_task,
 )
 from lerobot_excav.errors import require, require_choice
 
@@ -71,14 +73,14 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
         Raises:
             ConfigurationError: A field has a value that the environment cannot use.
         """
-        hint = "A task is a gym id without the part before the slash."
-        require_choice("env.task", self.task, self.TASKS, hint=hint)
+        require_task("env.task", self.task, self.TASKS)
         require_fps("env.fps", self.fps)
         require_image_size("env.observation_height", self.observation_height)
         require_image_size("env.observation_width", self.observation_width)
         require_choice("env.scene_set", self.scene_set, SCENE_SETS)
         require_choice("env.mask_condition", self.mask_condition, MASK_CONDITIONS)
         require_mask_noise("env.", self.mask_noise, self.mask_noise_px)
+        require_noise_effect("env.", self.mask_condition, self.mask_noise)
         require_episode_length("env.episode_length", self.episode_length)
         require_choice("env.render_mode", self.render_mode, RENDER_MODES)
         if self.metrics_episodes is not None:

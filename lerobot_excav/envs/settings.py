@@ -4,6 +4,7 @@ Importing this loads no simulator, so that every command of LeRobot can parse it
 names of the soil presets and fidelities are repeated here; a test keeps them equal.
 """
 
+from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
 
@@ -17,8 +18,9 @@ MASK_NOISES = ("none", "shift", "erode", "dilate")
 SOILS = ("sand", "gravel", "dirt", "wet_sand")
 FIDELITIES = ("fast", "standard", "fine")
 TARGETS_PER_SCENE = 4
+LAST_SCENE = 2**31 - 1  # of every scene set; datasets hold a scene's number as int64
 TICKS_PER_SECOND = 50
-EPISODE_DURATION_S = 20.0  # time limit of the excavator's episode unless another is asked for (kind: paper)
+EXCAVATOR_EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
 FR5_EPISODE_DURATION_S = 8.0  # that of the arm (kind: paper, 400 frames at 50 Hz)
 RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
@@ -45,6 +47,19 @@ def require_mask_noise(prefix: str, noise: str, size_px: int) -> None:
     )
 
 
+def require_noise_effect(prefix: str, condition: str, noise: str) -> None:
+    """Raise if noise is asked for on a mask that shows nothing.
+
+    Raises:
+        ConfigurationError: The mask's condition is `zero`, and there is noise.
+    """
+    require(
+        condition != "zero" or noise == "none",
+        f"{prefix}mask_noise={noise!r} has no effect with {prefix}mask_condition='zero', which shows no mask; "
+        "leave one of them out",
+    )
+
+
 def require_retarget_frame(field: str, frame: int | None, episode_length: int) -> None:
     """Raise unless another block may be commanded at this frame; None: never.
 
@@ -56,13 +71,13 @@ def require_retarget_frame(field: str, frame: int | None, episode_length: int) -
         require_integer(field, frame, 1, episode_length - 1, hint=hint)
 
 
-def require_excavator_task(field: str, task: str | None) -> None:
-    """Raise unless the task is one of the excavator.
+def require_task(field: str, task: str | None, tasks: Sequence[str]) -> None:
+    """Raise unless the task is one of those of an environment.
 
     Raises:
         ConfigurationError: The task is unknown.
     """
-    require_choice(field, task, EXCAVATOR_TASKS, hint="A task is a gym id without the part before the slash.")
+    require_choice(field, task, tasks, hint="A task is a gym id without the part before the slash.")
 
 
 def require_integer(field: str, value: Any, low: int, high: int | None = None, *, hint: str = "") -> None:

@@ -5,8 +5,15 @@ from pathlib import Path
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import SCENE_SETS, TARGETS_PER_SCENE, require_fps, require_image_size
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.envs.settings import (
+    LAST_SCENE,
+    SCENE_SETS,
+    TARGETS_PER_SCENE,
+    require_fps,
+    require_image_size,
+    require_integer,
+)
+from lerobot_excav.errors import require_choice
 
 ADVANCE_MODES = ("episode", "button")
 
@@ -51,8 +58,6 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
         for name in ("observation_height", "observation_width"):
             require_image_size(f"robot.{name}", getattr(self, name))
         require_choice("robot.scene_set", self.scene_set, SCENE_SETS)
-        require(
-            self.scene_id >= 0, f"robot.scene_id={self.scene_id} is not possible; scenes are numbered from 0."
-        )
+        require_integer("robot.scene_id", self.scene_id, 0, LAST_SCENE)
         require_choice("robot.target_id", self.target_id, range(TARGETS_PER_SCENE))
         require_choice("robot.advance", self.advance, ADVANCE_MODES)

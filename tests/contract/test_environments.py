@@ -176,7 +176,8 @@ def test_mask_noise_changes_the_mask_alone(gym_id: str, trace: Trace, noise: str
 
 
 def test_noise_of_no_size_is_refused(gym_id: str) -> None:
-    for settings in ({"mask_noise": "shift"}, {"mask_noise_px": 2}):
+    without_mask = {"mask_noise": "shift", "mask_noise_px": 2, "mask_condition": "zero"}
+    for settings in ({"mask_noise": "shift"}, {"mask_noise_px": 2}, without_mask):
         with pytest.raises(ConfigurationError, match="mask_noise"):
             gym.make(gym_id, **settings)
 

@@ -62,6 +62,7 @@ def test_the_nearest_target_is_that_of_the_scene():
         ("fr5_grasp", {"soil": "sand"}, "--soil='sand' has no meaning for --env=fr5_grasp"),
         ("fr5_grasp", {"fidelity": "fast"}, "--fidelity='fast' has no meaning for --env=fr5_grasp"),
         ("fr5_grasp", {"task": "Scoop-v0"}, "--task='Scoop-v0' is not known; allowed: 'FR5Grasp-v0'"),
+        ("fr5_grasp", {"first_scene": 2**63}, f"--first-scene={2**63} is not possible"),
         ("lathe", {}, "--env='lathe' is not known; allowed: 'excavator', 'fr5_grasp'"),
     ],
 )

@@ -76,6 +76,14 @@ def test_actions_out_of_range_are_found(tampered, toy_rig):
     }
 
 
+def test_actions_that_the_environment_clips_are_accepted(tampered, toy_rig):
+    def change(values, index):
+        values[frames_of(4, index)[2]][1] = -1.1
+
+    found = problems(tampered("action", change), toy_rig)
+    assert not any("action" in problem for problem in found.values())
+
+
 def test_a_mask_that_changes_is_found(tampered, toy_rig):
     def change(values, index):
         values[frames_of(4, index)[3]] = values[frames_of(5, index)[0]]

@@ -14,7 +14,7 @@ from lerobot_excav.datasets.resimulation import complete_recording
 from lerobot_excav.datasets.schema import excav_features
 from lerobot_excav.datasets.storage import STORAGES
 from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
-from lerobot_excav.errors import DatasetError
+from lerobot_excav.errors import DatasetError, ExcavError
 
 
 @pytest.fixture(scope="module")
@@ -218,6 +218,26 @@ def test_a_damaged_session_names_the_line(recording, toy_rig, tmp_path, text, me
     (tmp_path / "s.jsonl").write_text(text)
     with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
         complete_recording(folder / "recording", tmp_path / "s.jsonl", out=tmp_path / "c", rig=toy_rig())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"restarts": None}, r"restarts=None is not possible; give a list of frames"),
+        ({"target_id": 9}, "target_id=9 .*from 0 to 3"),
+        ({"scene_set": "foo"}, "scene_set='foo' .*'train'"),
+        ({"simulation_version": None}, "simulation_version=None .*whole number"),
+        ({"fps": "50"}, "fps='50' .*whole number"),
+        ({"soil": "lava"}, "soil='lava' .*'sand'"),
+        ({"task": "Dance-v0"}, "task='Dance-v0' .*'Scoop-v0'"),
+    ],
+)
+def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed(
+    recording, session, toy_rig, tmp_path, changes, message
+):
+    folder, _ = recording
+    with pytest.raises(ExcavError, match=rf"session\.jsonl:2: {message}"):
+        complete_recording(folder / "recording", session({1: changes}), out=tmp_path / "c", rig=toy_rig())
 
 
 @pytest.mark.parametrize("storage", STORAGES)

@@ -15,7 +15,7 @@ from lerobot_excav.datasets.schema import (
 )
 from lerobot_excav.errors import DatasetError
 
-LOSSLESS = {"video.crf": 0, "video.pix_fmt": "yuv444p"}
+LOSSLESS = {"video.codec": "h264", "video.crf": 0, "video.pix_fmt": "yuv444p"}
 
 
 @pytest.fixture(params=ENVIRONMENTS.values(), ids=ENVIRONMENTS)
@@ -90,6 +90,13 @@ def test_what_first_datasets_lack_may_be_missing_together_only():
         require_columns(EXCAVATOR, features)
 
 
+def test_the_arm_has_no_unmarked_datasets():
+    features = dataset_features(ENVIRONMENTS["fr5_grasp"], height=96, width=128)
+    del features["excav.simulation_version"]
+    with pytest.raises(DatasetError, match=r"lacks excav\.simulation_version"):
+        require_columns(ENVIRONMENTS["fr5_grasp"], features)
+
+
 def test_settings_of_other_environments_are_no_columns():
     assert not {"excav.soil", "excav.fidelity"} & excav_features(ENVIRONMENTS["fr5_grasp"]).keys()
 
@@ -99,7 +106,9 @@ def test_a_recording_without_excav_columns_is_refused_with_the_next_step(environ
         require_columns(environment, recorder_features(environment, use_videos=False))
 
 
-@pytest.mark.parametrize("changes", [{"video.crf": 30}, {"video.pix_fmt": "yuv420p"}, {"video.crf": None}])
+@pytest.mark.parametrize(
+    "changes", [{"video.crf": 30}, {"video.pix_fmt": "yuv420p"}, {"video.crf": None}, {"video.codec": "hevc"}]
+)
 def test_a_video_with_losses_is_refused_with_the_next_step(environment, changes):
     with pytest.raises(DatasetError, match=r"dtype='video'.*blurs the mask.*--dataset.video=false"):
         require_columns(environment, stored_as_video(environment, {**LOSSLESS, **changes}))

@@ -91,7 +91,7 @@ def test_every_setting_reaches_the_environment() -> None:
         "observation_height": 64,
         "observation_width": 80,
         "scene_set": "test",
-        "mask_condition": "zero",
+        "mask_condition": "random",
         "mask_noise": "dilate",
         "mask_noise_px": 3,
         "soil": "gravel",

@@ -37,13 +37,13 @@ def test_every_setting_reaches_the_environment():
         mask_noise_px=3,
         retarget_frame=20,
         scene_set="test",
-        mask_condition="zero",
+        mask_condition="random",
         fps=25,
     )
     vector = config.create_envs(1)["fr5_grasp"][0]
     env = vector.envs[0].unwrapped
     assert (env.mask_noise, env.mask_noise_px, env.retarget_frame) == ("shift", 3, 20)
-    assert (env.scene_set, env.mask_condition, env.fps, env.episode_length) == ("test", "zero", 25, 200)
+    assert (env.scene_set, env.mask_condition, env.fps, env.episode_length) == ("test", "random", 25, 200)
     vector.close()
 
 

@@ -19,7 +19,8 @@ from lerobot_excav.envs.mask_noise import noisy_mask
 from lerobot_excav.envs.observation import OBS_TYPES, observation_space
 from lerobot_excav.envs.selection import select_scene_and_target
 from lerobot_excav.envs.settings import (
-    EPISODE_DURATION_S,
+    EXCAVATOR_EPISODE_DURATION_S,
+    EXCAVATOR_TASKS,
     FIDELITIES,
     MASK_CONDITIONS,
     RENDER_MODES,
@@ -28,10 +29,11 @@ from lerobot_excav.envs.settings import (
     TARGETS_PER_SCENE,
     TICKS_PER_SECOND,
     require_episode_length,
-    require_excavator_task,
     require_fps,
     require_image_size,
     require_mask_noise,
+    require_noise_effect,
+    require_task,
 )
 from lerobot_excav.errors import ConfigurationError, require_choice
 
@@ -107,11 +109,12 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         render_mode: str | None = "rgb_array",
         depth_info: bool = False,
     ) -> None:
-        require_excavator_task("task", task)
+        require_task("task", task, EXCAVATOR_TASKS)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
         require_mask_noise("", mask_noise, mask_noise_px)
+        require_noise_effect("", mask_condition, mask_noise)
         require_choice("soil", soil, SOILS)
         require_choice("fidelity", fidelity, FIDELITIES)
         require_choice("render_mode", render_mode, RENDER_MODES)
@@ -124,7 +127,9 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         self.mask_noise, self.mask_noise_px = mask_noise, mask_noise_px
         self.soil_name, self.fidelity = soil, fidelity
         self.fps = fps
-        self.episode_length = round(EPISODE_DURATION_S * fps) if episode_length is None else episode_length
+        self.episode_length = (
+            round(EXCAVATOR_EPISODE_DURATION_S * fps) if episode_length is None else episode_length
+        )
         self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
         self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
         self.metadata = {**type(self).metadata, "render_fps": fps}

@@ -72,14 +72,14 @@ JOINT_ARMATURE = (0.1, 0.1, 0.1, 0.02, 0.02, 0.02)
 JOINT_FRICTION_N_M = (1.0, 1.0, 1.0, 0.2, 0.2, 0.2)
 
 HOME_JOINT_POS = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])
-"""Tool straight down, 0.48 m above the table [rad] (published demonstrations of this task; kind: paper)."""
+"""Tool straight down, its flange 0.48 m above the table [rad] (published demonstrations of this task; kind: paper)."""
 
 # Gripper: a stand-in for the AgiBot OmniPicker, whose adaptive linkage moves the fingertips almost in parallel.
 HAND_RADIUS_M, HAND_LENGTH_M = 0.032, 0.090  # kind: derived from the drawing
 HAND_MASS_KG = 0.36  # kind: derived, so that hand and fingers weigh the 0.43 kg of the manual
 FINGER_MASS_KG = (0.040, 0.030)  # wide, narrow; kind: derived
 FINGER_STROKE_M = 0.060
-"""Travel of each finger from closed to open [m]: 120 mm between the pads (manual; kind: datasheet)."""
+"""Travel of each finger from closed to open [m]: 120 mm between the pads (remembered from the manual; kind: guess)."""
 PAD_CENTRE_M = 0.143
 """Centre of the pads in front of the flange [m] (tool centre point of the manufacturer's model; kind: datasheet)."""
 PAD_WIDTH_M = (0.018, 0.010)  # wide, narrow; kind: derived

@@ -28,6 +28,7 @@ from lerobot_excav.envs.settings import (
     require_fps,
     require_image_size,
     require_mask_noise,
+    require_noise_effect,
     require_retarget_frame,
 )
 from lerobot_excav.errors import ConfigurationError, require_choice
@@ -102,6 +103,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_choice("scene_set", scene_set, SCENE_SETS)
         require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
         require_mask_noise("", mask_noise, mask_noise_px)
+        require_noise_effect("", mask_condition, mask_noise)
         require_choice("render_mode", render_mode, RENDER_MODES)
         require_fps("fps", fps)
         require_image_size("observation_height", observation_height)

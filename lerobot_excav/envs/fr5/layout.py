@@ -20,7 +20,7 @@ BLOCK_AREA_X_W = (0.0, 0.2)
 BLOCK_AREA_Y_W = (0.4, 0.6)
 """Where the centres of the blocks may lie: the published area of targets, as every block may be one (kind: paper)."""
 BLOCK_SPACING_M = 0.08
-"""Least distance of two centres [m]; the published 0.07 leaves the open fingers 2 mm on either side (kind: tuned)."""
+"""Least distance of two centres [m]; the published 0.07 leaves the open fingers 0.8 mm on either side (kind: tuned)."""
 BLOCK_YAW_RAD = 0.1  # largest turn of a block about z (kind: guess)
 
 TRAY_POS_W = (0.42, 0.75)

@@ -31,7 +31,7 @@ TASK_STATE_NAMES = (
 )
 """Entries of `task_state`: centre of the commanded block above its place on the table [m], its distance from the grasp
 point [m] and from the tray's axis [m], pads that touch it [0..2], whether it is lifted by the fingers, whether it rests
-in the tray, released, how many blocks do so, and the first block that was lifted (-1: none)."""
+in the tray, released, how many blocks do so, and the first block that was lifted since the last command (-1: none)."""
 
 
 class GraspTask:
@@ -72,7 +72,7 @@ class GraspTask:
         return self._commanded[-1]
 
     def retarget(self, target_id: int) -> None:
-        """Command another block from now on.
+        """Command another block from now on; which block is grasped first is asked anew.
 
         Args:
             target_id: Index of the block.
@@ -81,11 +81,13 @@ class GraspTask:
             ConfigurationError: There is no such block.
         """
         self._commanded.append(_checked_target(target_id))
+        self._first_grasped = NO_BLOCK
 
     def update(self) -> float:
         """Look at the cell after a frame, and return the frame's reward."""
+        already_lifted = self._lifted
         self._look()
-        lifted = np.flatnonzero(self._lifted)
+        lifted = np.flatnonzero(self._lifted & ~already_lifted)
         if self._first_grasped == NO_BLOCK and lifted.size:
             self._first_grasped = int(lifted[0])
         reward = self._reward()

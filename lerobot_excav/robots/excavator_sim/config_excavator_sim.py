@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import FIDELITIES, SOILS, require_excavator_task
+from lerobot_excav.envs.settings import EXCAVATOR_TASKS, FIDELITIES, SOILS, require_task
 from lerobot_excav.errors import require_choice
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 
@@ -33,6 +33,6 @@ class ExcavatorSimConfig(SimulatedRobotConfig):
             ConfigurationError: A field has a value that the simulation cannot use.
         """
         super().__post_init__()
-        require_excavator_task("robot.task", self.task)
+        require_task("robot.task", self.task, EXCAVATOR_TASKS)
         require_choice("robot.soil", self.soil, SOILS)
         require_choice("robot.fidelity", self.fidelity, FIDELITIES)

@@ -50,6 +50,26 @@ def test_another_block_in_the_tray_is_no_success(task, workcell):
     assert not task.episode_metrics["target_in_tray"]
 
 
+def test_after_a_change_of_command_the_first_grasped_block_is_asked_anew(task, workcell, monkeypatch):
+    def grasp(block):
+        touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
+        if block is not None:
+            put(workcell, block, (0.1, 0.5, layout.block_rest_height_m() + 0.1))
+            hold(workcell, 1)
+            touching[:, block] = True
+        monkeypatch.setattr(workcell, "fingers_touching", lambda: touching)
+        task.update()
+        return task.episode_metrics["first_grasped_block"]
+
+    assert grasp(2) == 2
+    task.retarget(3)
+    assert grasp(2) == NO_BLOCK  # still held from before
+    assert grasp(None) == NO_BLOCK
+    assert grasp(3) == 3
+    assert task.episode_metrics["target_grasped"]
+    assert grasp(None) == 3
+
+
 def test_a_second_block_in_the_tray_spoils_the_success(task, workcell):
     put(workcell, 1, np.add(IN_TRAY, (-0.03, 0, 0)))
     put(workcell, 3, np.add(IN_TRAY, (0.03, 0, 0)))

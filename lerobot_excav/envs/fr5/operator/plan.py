@@ -16,7 +16,7 @@ LIFT_HEIGHT_M = 0.14
 TRAY_HEIGHT_M = 0.12
 RELEASE_HEIGHT_M = 0.055
 
-# Openings of the gripper: wide enough to clear a block by 18 mm on either side, narrow enough to miss its neighbours.
+# Openings of the gripper: wide enough to clear a block by 17 mm on either side, narrow enough to miss its neighbours.
 OPEN, CLOSED = 0.62, 0.0
 
 # Nominal durations of the phases [s] (kind: tuned; the published ones, with a shorter carry and a slower way back, on
