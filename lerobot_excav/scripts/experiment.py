@@ -54,13 +54,20 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
         print("\n".join(_script(experiment, stages)))
         return 0
-    signal.signal(signal.SIGTERM, _interrupt)  # `kill` ends the stages as Ctrl-C does
+    _end_stages_on(signal.SIGTERM, signal.SIGHUP)
     succeeded = run_experiment(experiment, stages, jobs=arguments.jobs, say=_say)
     return 0 if succeeded else 1
 
 
 def _say(line: str) -> None:
     print(line, flush=True)
+
+
+def _end_stages_on(*numbers: signal.Signals) -> None:
+    """Let `kill` and a closed terminal end the stages as Ctrl-C does; what is ignored, as under `nohup`, stays so."""
+    for number in numbers:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:

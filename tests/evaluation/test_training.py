@@ -32,6 +32,20 @@ def test_a_continued_training_goes_on_from_its_last_checkpoint(tmp_path):
     assert training_minutes(log) == {900: 10.0, 1800: 15.0}
 
 
+def test_a_checkpoint_that_was_lost_while_it_was_saved_costs_no_time(tmp_path):
+    log = tmp_path / "t.log"
+    first = START.format("12:00:00") + SAVED.format("12:10:00", 900) + SAVED.format("12:20:00", 1800)
+    log.write_text(first + START.format("15:00:00") + SAVED.format("15:11:00", 1800))
+    assert training_minutes(log) == {900: 10.0, 1800: 21.0}
+
+
+def test_a_training_that_began_anew_owes_nothing_to_the_one_before(tmp_path):
+    log = tmp_path / "t.log"
+    discarded = START.format("12:00:00") + SAVED.format("12:10:00", 900) + SAVED.format("12:20:00", 1800)
+    log.write_text(discarded + START.format("15:00:00") + SAVED.format("15:11:00", 900))
+    assert training_minutes(log)[900] == 11.0
+
+
 def test_without_a_log_nothing_is_known(tmp_path):
     assert training_minutes(tmp_path / "none.log") == {}
 

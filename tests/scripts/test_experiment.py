@@ -1,3 +1,9 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 
 from lerobot_excav.scripts.main import main
@@ -64,3 +70,17 @@ def test_a_setting_can_be_replaced(file, tmp_path):
 def test_options_that_cannot_be_used_are_named(file, capsys, option, message):
     assert main(["experiment", str(file), *option]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_closed_terminal_ends_the_stages(tmp_path):
+    path = tmp_path / "stages.toml"
+    path.write_text(
+        f'[[stage]]\nname = "long"\nmakes = "{tmp_path}/long"\ncommand = "touch {tmp_path}/begun; sleep 60"'
+    )
+    code = "from lerobot_excav.scripts.main import main; raise SystemExit(main())"
+    runner = subprocess.Popen([sys.executable, "-c", code, "experiment", str(path)])
+    while not (tmp_path / "begun").exists():
+        time.sleep(0.05)
+    os.kill(runner.pid, signal.SIGHUP)
+    assert runner.wait(30) == 130
+    assert '"exit_code": -15' in (tmp_path / "long.json").read_text()

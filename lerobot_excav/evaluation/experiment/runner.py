@@ -8,7 +8,7 @@ from lerobot_excav.errors import ConfigurationError, require
 from lerobot_excav.evaluation.experiment.experiment import Experiment
 from lerobot_excav.evaluation.experiment.stage import Stage
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
-from lerobot_excav.evaluation.experiment.stage_run import StageRun
+from lerobot_excav.evaluation.experiment.stage_run import StageRun, lock_log
 
 POLL_S = 0.2
 
@@ -31,7 +31,7 @@ def state(stage: Stage) -> str:
 def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int, say: Say) -> bool:
     """Run the unfinished ones of some stages, each after those it needs.
 
-    After a failure no further stage is started. An interruption (Ctrl-C) ends what is running.
+    After a failure no further stage is started. An interruption (Ctrl-C) or an error here ends what is running.
 
     Args:
         experiment: The experiment.
@@ -60,9 +60,10 @@ def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int
                 if not _end(ended, say):
                     failed.append(ended.stage.name)
             time.sleep(POLL_S)
-    except KeyboardInterrupt:
+    except BaseException:
         for run in running:
             run.stop()
+        for run in running:
             run.finish()
         raise
     return not failed
@@ -95,18 +96,28 @@ def _start_ready(
     for stage in ready[: max(0, jobs - len(running))]:
         waiting.remove(stage)
         log = experiment_log(experiment, stage)
-        say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
-        say("    " + " && \\\n    ".join(stage.shell_lines()))
-        if _goes_on_differently(stage):
-            say(
-                f"    begun by another command than the file has now, and goes on as that; or remove {stage.workspace}"
-            )
         try:
-            running.append(StageRun(stage, experiment.environment, log))
+            output = lock_log(log, stage.name)
         except ConfigurationError as error:
             say(f"! {stage.name}: {error}")
             refused.append(stage.name)
+            continue
+        if stage.is_finished:
+            output.close()
+            say(f"= {stage.name}: another process has finished {stage.makes}")
+            continue
+        _announce(stage, log, say)
+        running.append(StageRun(stage, experiment.environment, output))
     return refused
+
+
+def _announce(stage: Stage, log: Path, say: Say) -> None:
+    say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
+    say("    " + " && \\\n    ".join(stage.shell_lines()))
+    if _goes_on_differently(stage):
+        say(
+            f"    begun by another command than the file has now, and goes on as that; or remove {stage.workspace}"
+        )
 
 
 def _goes_on_differently(stage: Stage) -> bool:
@@ -123,8 +134,14 @@ def experiment_log(experiment: Experiment, stage: Stage) -> Path:
 
 def _end(run: StageRun, say: Say) -> bool:
     succeeded = run.finish()
-    verdict = "finished" if succeeded else f"FAILED with exit code {run.exit_code}, see {run.log}"
+    verdict = "finished" if succeeded else f"FAILED {_reason(run)}, see {run.log},"
     say(f"{'=' if succeeded else '!'} {run.stage.name}: {verdict} after {run.wall_s / 60:.1f} min")
     if succeeded and run.stage.makes is None:
         say(run.output())
     return succeeded
+
+
+def _reason(run: StageRun) -> str:
+    if run.exit_code:
+        return f"with exit code {run.exit_code}"
+    return f"without making {run.stage.workspace}, though its command succeeded"

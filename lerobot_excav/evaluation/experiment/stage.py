@@ -64,6 +64,11 @@ class Stage:
         return self.resumption is not None and self.resumption.source.exists()
 
     @property
+    def goes_on(self) -> bool:
+        """Whether the next run adds to what the last one has left; else it begins anew."""
+        return self.resumes or (self.appears_whole and self.is_started)
+
+    @property
     def next_command(self) -> str:
         """The command of the next run."""
         return self.resumption.command if self.resumption and self.resumes else self.command

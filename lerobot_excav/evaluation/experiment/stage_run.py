@@ -18,7 +18,6 @@ from lerobot_excav.evaluation.experiment.stage import Stage
 from lerobot_excav.evaluation.experiment.stage_record import (
     StageRecord,
     attempt,
-    log_path,
     new_record,
     read_record,
     record_path,
@@ -34,37 +33,35 @@ class StageRun:
     Args:
         stage: What to run; nothing may lie at its result.
         environment: Variables for the command, beside those of this process.
-        log: File that takes the output of a stage without result.
-
-    Raises:
-        ConfigurationError: Another process is at it.
+        output: The stage's log from `lock_log`; held until the result is in place.
     """
 
-    def __init__(self, stage: Stage, environment: Mapping[str, str], log: Path) -> None:
+    def __init__(self, stage: Stage, environment: Mapping[str, str], output: IO[str]) -> None:
         self.stage = stage
-        self.log = log if stage.makes is None else log_path(stage.makes)
-        self._resumed = stage.resumes
+        self.log = Path(output.name)
+        self._output = output
         self._command = stage.next_command
         self._environment = environment
-        self.log.parent.mkdir(parents=True, exist_ok=True)
-        with self.log.open("a") as output:
-            _lock(output, stage.name)
-            if not self._resumed and stage.workspace not in (None, stage.makes):
-                shutil.rmtree(str(stage.workspace), ignore_errors=True)
-            self._started, self._clock = datetime.now(UTC), time.monotonic()
-            output.write(f"\n# {self._started:%Y-%m-%d %H:%M:%S} UTC\n{self._command}\n\n")
-            output.flush()
-            self._said_from = output.tell()
-            self._record_start()
-            self._process = _start(self._command, environment, output)
+        if not stage.goes_on:
+            self._clear()
+        self._started, self._clock = datetime.now(UTC), time.monotonic()
+        output.write(f"\n# {self._started:%Y-%m-%d %H:%M:%S} UTC\n{self._command}\n\n")
+        output.flush()
+        self._said_from = output.tell()
+        self._record_start()
+        self._process = _start(self._command, environment, output)
+
+    def _clear(self) -> None:
+        """Begin anew: what an earlier run has left and said belongs to no result."""
+        self._output.seek(0)
+        self._output.truncate()
+        if self.stage.workspace != self.stage.makes:
+            shutil.rmtree(str(self.stage.workspace), ignore_errors=True)
 
     def _record_start(self) -> None:
         """Tell the command before it runs: if this process is killed, the next one must know what began the result."""
         makes = self.stage.makes
-        if makes is None:
-            return
-        goes_on = self._resumed or self.stage.appears_whole
-        if not (goes_on and record_path(makes).is_file()):
+        if makes is not None and not (self.stage.goes_on and record_path(makes).is_file()):
             self._new_record().write(makes)
 
     def _new_record(self) -> StageRecord:
@@ -99,6 +96,10 @@ class StageRun:
     def finish(self) -> bool:
         """Write the record of an ended command and put its result in place; return whether it succeeded."""
         exit_code = self._process.wait()
+        with self._output:
+            return self._keep(exit_code)
+
+    def _keep(self, exit_code: int) -> bool:
         succeeded = exit_code == 0
         makes, workspace = self.stage.makes, self.stage.workspace
         if makes is None or workspace is None:
@@ -113,14 +114,28 @@ class StageRun:
         return True
 
 
-def _lock(log: IO[str], name: str) -> None:
-    """Hold the log alone; the command inherits the lock, so that it holds until both have ended."""
+def lock_log(log: Path, name: str) -> IO[str]:
+    """Open the log of a stage and hold it alone.
+
+    A command that writes to it inherits the lock: it holds until the file is closed and the command has ended.
+
+    Args:
+        log: The log.
+        name: Name of the stage.
+
+    Raises:
+        ConfigurationError: Another process is at the stage.
+    """
+    log.parent.mkdir(parents=True, exist_ok=True)
+    output = log.open("a")
     try:
-        fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(output, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
+        output.close()
         raise ConfigurationError(
-            f"another process is at stage {name}, by the lock on {log.name}; wait for it, or end it"
+            f"another process is at stage {name}, by the lock on {log}; wait for it, or end it"
         ) from None
+    return output
 
 
 def _start(command: str, environment: Mapping[str, str], output: IO[str]) -> "subprocess.Popen[bytes]":

@@ -5,10 +5,10 @@ import time
 
 import pytest
 
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.experiment.runner import run_experiment, state
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
-from lerobot_excav.evaluation.experiment.stage_run import StageRun
+from lerobot_excav.evaluation.experiment.stage_run import StageRun, lock_log
 
 # A command that leaves a trace of every run, then makes its folder.
 COUNTED = """
@@ -26,6 +26,11 @@ def counted(name="data", command="mkdir {makes}"):
 def runs(tmp_path, name="data"):
     path = tmp_path / f"{name}.runs"
     return len(path.read_text().split()) if path.exists() else 0
+
+
+def wait_for(started):
+    while started.exit_code is None:
+        time.sleep(0.05)
 
 
 def run(experiment, *only, jobs=1):
@@ -63,8 +68,18 @@ def test_a_failed_stage_leaves_no_result_and_is_run_again_from_nothing(experimen
     assert [attempt["exit_code"] for attempt in read_record(tmp_path / "data").attempts] == [0]
 
 
-def test_a_command_that_makes_nothing_has_failed(experiment):
-    assert not run(experiment(counted(command="true")))[0]
+def test_a_command_that_makes_nothing_has_failed(experiment, tmp_path):
+    succeeded, said = run(experiment(counted(command="true")))
+    assert not succeeded
+    assert f"FAILED without making {tmp_path}/data.partial, though its command succeeded" in said
+
+
+def test_a_fresh_start_begins_a_new_log(experiment, tmp_path):
+    assert not run(experiment(counted(command="echo before && false")))[0]
+    assert run(experiment(counted(command="echo after && mkdir {makes}")))[0]
+    log = log_path(tmp_path / "data").read_text()
+    assert "after" in log
+    assert "before" not in log
 
 
 def test_after_a_failure_nothing_further_is_started(experiment, tmp_path):
@@ -93,13 +108,16 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(experiment, tmp_pat
     record = read_record(tmp_path / "train")
     assert record.command == training.stages[0].command
     assert [attempt["exit_code"] for attempt in record.attempts] == [1, 0]
+    assert training.stages[0].command in log_path(tmp_path / "train").read_text()
     assert record.wall_s == pytest.approx(sum(attempt["wall_s"] for attempt in record.attempts))
 
 
 def test_a_training_goes_on_under_its_own_command_when_its_runner_was_killed(experiment, tmp_path):
     training = experiment(RESUMED)
     (stage,) = training.stages
-    StageRun(stage, {}, log_path(stage.makes)).stop()  # its end is never seen
+    log = lock_log(log_path(stage.makes), stage.name)
+    wait_for(StageRun(stage, {}, log))
+    log.close()  # without `finish`: its end is never seen
     (tmp_path / "train.partial").mkdir(exist_ok=True)
     (tmp_path / "train.partial" / "checkpoint").touch()
     assert run(training)[0]
@@ -196,3 +214,67 @@ def test_two_runners_do_not_work_on_one_stage(experiment, tmp_path):
     other.join()
     assert runs(tmp_path) == 1
     assert (tmp_path / "data").exists()
+
+
+def test_what_another_process_finishes_meanwhile_is_not_run_again(experiment, tmp_path):
+    both = experiment(
+        counted("slow", "until test -e {tmp}/b; do sleep 0.05; done; mkdir {makes}") + counted("b")
+    )
+    said = []
+    other = threading.Thread(target=lambda: said.extend(run(both)))
+    other.start()
+    while not (tmp_path / "slow.runs").exists():
+        time.sleep(0.05)
+    assert run(both, "b")[0]
+    other.join()
+    assert said[0]
+    assert f"b: another process has finished {tmp_path}/b" in said[1]
+    assert runs(tmp_path, "b") == 1
+
+
+def test_a_stage_is_held_until_its_result_is_in_place(experiment, tmp_path):
+    (stage,) = experiment(counted()).stages
+    log = log_path(stage.makes)
+    running = StageRun(stage, {}, lock_log(log, stage.name))
+    wait_for(running)
+    with pytest.raises(ConfigurationError, match="another process is at stage data"):
+        lock_log(log, stage.name)
+    assert running.finish()
+    lock_log(log, stage.name).close()
+
+
+def test_an_error_of_the_runner_ends_what_is_running(experiment, tmp_path):
+    damaged = counted(
+        "damaged", "until test -s {tmp}/pid; do sleep 0.05; done; echo damaged > {tmp}/damaged.json"
+    )
+    long = counted("long", "echo $$ > {tmp}/pid && sleep 60")
+    with pytest.raises(DatasetError, match=r"damaged\.json is damaged"):
+        run(experiment(damaged + long), jobs=2)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
+    assert [attempt["exit_code"] for attempt in read_record(tmp_path / "long").attempts] == [-signal.SIGTERM]
+
+
+IN_PLACE = """
+[[stage]]
+name = "data"
+makes = "{tmp}/data"
+appears_whole = true
+command = "test -e {tmp}/data.partial || { touch {tmp}/data.partial; WORD; }; mv {tmp}/data.partial {makes}"
+"""
+
+
+def test_a_removed_result_that_appears_whole_gets_a_new_record(experiment, tmp_path):
+    for word in ("true", "echo"):
+        made = experiment(IN_PLACE.replace("WORD", word))
+        assert run(made)[0]
+        assert state(made.stages[0]) == "finished"
+        assert len(read_record(tmp_path / "data").attempts) == 1
+        (tmp_path / "data").unlink()
+
+
+def test_an_interrupted_result_that_appears_whole_keeps_the_record_it_was_begun_with(experiment, tmp_path):
+    made = experiment(IN_PLACE.replace("WORD", "false"))
+    assert not run(made)[0]
+    assert run(made)[0]
+    assert [attempt["exit_code"] for attempt in read_record(tmp_path / "data").attempts] == [1, 0]
