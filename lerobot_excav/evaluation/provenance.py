@@ -1,18 +1,16 @@
 """Where an evaluation comes from: its command and code, and the training of its policy.
 
 The record of its stage lies beside the metrics file, or beside their folder, as a JSON file of the same name. Copies of
-metrics files keep theirs, with the training in it.
+metrics files keep theirs. The training is that of the record; records of earlier versions have none, and the training
+is looked up where their command found the policy.
 """
 
-import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from lerobot_excav.evaluation.experiment.stage_record import StageRecord, read_json, record_from, record_path
-from lerobot_excav.evaluation.training import Training, read_training
-
-_POLICY_PATH = re.compile(r"--policy\.path[= ](\S+)")
+from lerobot_excav.evaluation.training import Training, evaluated_training, training_from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +38,7 @@ def read_provenance(metrics: Path) -> Provenance:
         metrics: Its metrics file.
 
     Raises:
-        DatasetError: What lies in the place of the record is none.
+        DatasetError: What lies in the place of the record is none, or its training is not one.
     """
     path = record_path(metrics.parent) if metrics.stem == "metrics" else metrics.with_suffix(".json")
     if not path.is_file():
@@ -49,10 +47,5 @@ def read_provenance(metrics: Path) -> Provenance:
     training = content.pop("training", None)
     record = record_from(content, path) if content else None
     if training is not None:
-        return Provenance(record=record, training=Training(**training))
-    return Provenance(record=record, training=_training(record))
-
-
-def _training(record: StageRecord | None) -> Training | None:
-    found = _POLICY_PATH.search(record.command) if record else None
-    return read_training(Path(found[1])) if found else None
+        return Provenance(record=record, training=training_from(training, path))
+    return Provenance(record=record, training=evaluated_training(record.command) if record else None)

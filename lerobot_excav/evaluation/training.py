@@ -2,12 +2,17 @@
 
 import json
 import math
-from dataclasses import asdict, dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
 from lerobot_excav.evaluation.training_log import training_minutes
+
+_POLICY_PATH = re.compile(r"--policy\.path[= ](\S+)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +83,27 @@ def read_training(pretrained: Path) -> Training | None:
         command=record.command if record else None,
         commit=record.commit if record else None,
     )
+
+
+def evaluated_training(command: str) -> Training | None:
+    """Read how the policy of an evaluation is trained by now; None if the command names no checkpoint that is there."""
+    found = _POLICY_PATH.search(command)
+    return read_training(Path(found[1])) if found else None
+
+
+def training_from(content: Mapping[str, Any], path: Path) -> Training:
+    """Make a training of its entries in a file.
+
+    Raises:
+        DatasetError: They are others.
+    """
+    unlike = sorted(set(content) ^ {entry.name for entry in fields(Training)})
+    if unlike:
+        raise DatasetError(
+            f"{path}: its `training` has other entries than this version knows: {', '.join(unlike)}; "
+            "remove `training` from the file, or make it again with this version"
+        )
+    return Training(**content)
 
 
 def _steps(checkpoint: Path) -> int | None:

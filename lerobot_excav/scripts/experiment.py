@@ -11,8 +11,8 @@ Examples:
       the commands still to be run, as a shell script
   lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=2
       run them, two at a time
-  lerobot-excav experiment experiments/fr5_grasp/stages.toml --only 'data-*' 'train-*' --set batch_size=8
-      some of them, with another value of a setting
+  lerobot-excav experiment experiments/fr5_grasp/stages.toml --only 'data-*' --set out=outputs/trial paired_scenes=5
+      some of them, with other values of settings, in a folder of their own
 """
 
 import argparse
@@ -24,9 +24,10 @@ from types import FrameType
 
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.experiment.experiment import Experiment, read_experiment
-from lerobot_excav.evaluation.experiment.runner import run_experiment, state
+from lerobot_excav.evaluation.experiment.runner import run_experiment
 from lerobot_excav.evaluation.experiment.stage import Stage
 from lerobot_excav.evaluation.experiment.stage_record import read_record
+from lerobot_excav.evaluation.experiment.stage_state import state
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     experiment = read_experiment(arguments.file, _settings(arguments.set))
     stages = experiment.select(arguments.only)
     if arguments.list:
-        print("\n".join(_line(stage) for stage in stages))
+        print("\n".join(_line(experiment, stage) for stage in stages))
         return 0
     if arguments.dry_run:
         print("\n".join(_script(experiment, stages)))
@@ -83,10 +84,10 @@ def _settings(pairs: Sequence[str]) -> dict[str, str]:
     return settings
 
 
-def _line(stage: Stage) -> str:
+def _line(experiment: Experiment, stage: Stage) -> str:
     record = read_record(stage.makes) if stage.makes is not None and stage.is_finished else None
     wall = f"{record.wall_s / 60:7.1f} min" if record else " " * 11
-    return f"{state(stage):12}{wall}  {stage.name:32}  {stage.makes or ''}"
+    return f"{state(experiment, stage):12}{wall}  {stage.name:32}  {stage.makes or ''}"
 
 
 def _script(experiment: Experiment, stages: Sequence[Stage]) -> list[str]:

@@ -9,23 +9,11 @@ from lerobot_excav.evaluation.experiment.experiment import Experiment
 from lerobot_excav.evaluation.experiment.stage import Stage
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
 from lerobot_excav.evaluation.experiment.stage_run import StageRun, lock_log
+from lerobot_excav.evaluation.experiment.stage_state import REASONS, made_from, state
 
 POLL_S = 0.2
 
 Say = Callable[[str], None]
-
-
-def state(stage: Stage) -> str:
-    """Say in a word how far a stage is: `finished`, `changed`, `interrupted`, `to do` or `always`.
-
-    `changed`: the result was made by another command than the file has now; it is kept.
-    """
-    if stage.makes is None:
-        return "always"
-    if stage.is_finished:
-        record = read_record(stage.makes)
-        return "finished" if record is None or record.command == stage.command else "changed"
-    return "interrupted" if stage.is_started else "to do"
 
 
 def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int, say: Say) -> bool:
@@ -48,7 +36,7 @@ def run_experiment(experiment: Experiment, stages: Sequence[Stage], *, jobs: int
     require(jobs >= 1, f"--jobs={jobs} must be at least 1")
     waiting = [stage for stage in stages if not stage.is_finished]
     _require_needs(experiment, waiting)
-    _tell_finished(stages, say)
+    _tell_finished(experiment, stages, say)
     running: list[StageRun] = []
     failed: list[str] = []
     try:
@@ -79,11 +67,12 @@ def _require_needs(experiment: Experiment, waiting: Sequence[Stage]) -> None:
             )
 
 
-def _tell_finished(stages: Sequence[Stage], say: Say) -> None:
+def _tell_finished(experiment: Experiment, stages: Sequence[Stage], say: Say) -> None:
     for stage in stages:
         if stage.is_finished:
-            hint = " by another command than the file has now; remove it to run the stage again"
-            say(f"= {stage.name}: {stage.makes} is finished{hint if state(stage) == 'changed' else ''}")
+            reason = REASONS.get(state(experiment, stage))
+            hint = f", but {reason}; remove it to run the stage again" if reason else ""
+            say(f"= {stage.name}: {stage.makes} is finished{hint}")
 
 
 def _start_ready(
@@ -106,12 +95,16 @@ def _start_ready(
             output.close()
             say(f"= {stage.name}: another process has finished {stage.makes}")
             continue
-        _announce(stage, log, say)
-        running.append(StageRun(stage, experiment.environment, output))
+        _announce(experiment, stage, log, say)
+        needs = made_from(experiment, stage)
+        running.append(StageRun(stage, experiment.environment, output, needs=needs))
     return refused
 
 
-def _announce(stage: Stage, log: Path, say: Say) -> None:
+def _announce(experiment: Experiment, stage: Stage, log: Path, say: Say) -> None:
+    for need in map(experiment.stage, stage.needs):
+        if reason := REASONS.get(state(experiment, need)):
+            say(f"! {stage.name}: works on {need.makes}, which {reason}; remove that to make it again")
     say(f"> {stage.name}{' (continued)' if stage.resumes else ''}; its output: {log}")
     say("    " + " && \\\n    ".join(stage.shell_lines()))
     if _goes_on_differently(stage):

@@ -3,7 +3,7 @@
 import json
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -27,6 +27,8 @@ class StageRecord:
         modified: Whether the package differed from that commit.
         packages: Versions by distribution.
         attempts: Of every run: `started` (UTC), `wall_s`, `exit_code`.
+        needs: When the results that it was made from were `made`, by their stages; without those made by hand.
+        training: How the policy of an evaluation had been trained when it began; None for other stages.
     """
 
     stage: str
@@ -36,6 +38,13 @@ class StageRecord:
     modified: bool
     packages: Mapping[str, str]
     attempts: Sequence[Mapping[str, Any]] = field(default_factory=list)
+    needs: Mapping[str, str] = field(default_factory=dict)
+    training: Mapping[str, Any] | None = None
+
+    @property
+    def made(self) -> str | None:
+        """Start of the last run (UTC), which tells results of one name apart; None if none has ended."""
+        return str(self.attempts[-1]["started"]) if self.attempts else None
 
     @property
     def wall_s(self) -> float:
@@ -91,7 +100,12 @@ def record_from(content: Mapping[str, Any], path: Path) -> StageRecord:
     Raises:
         DatasetError: It is something else.
     """
-    unlike = sorted(set(content) ^ {entry.name for entry in fields(StageRecord)})
+    entries = fields(StageRecord)
+    # Records of earlier versions lack what has a default.
+    missing = {entry.name for entry in entries if entry.default is entry.default_factory is MISSING} - set(
+        content
+    )
+    unlike = sorted(missing | set(content) - {entry.name for entry in entries})
     if unlike:
         raise DatasetError(
             f"{path} is no record of a stage, by its entries {', '.join(unlike)}; move it elsewhere: its name "
@@ -100,7 +114,14 @@ def record_from(content: Mapping[str, Any], path: Path) -> StageRecord:
     return StageRecord(**content)
 
 
-def new_record(stage: str, command: str, environment: Mapping[str, str]) -> StageRecord:
+def new_record(
+    stage: str,
+    command: str,
+    environment: Mapping[str, str],
+    *,
+    needs: Mapping[str, str],
+    training: Mapping[str, Any] | None,
+) -> StageRecord:
     """Describe a command that is about to be run."""
     commit, modified = _code()
     return StageRecord(
@@ -110,18 +131,22 @@ def new_record(stage: str, command: str, environment: Mapping[str, str]) -> Stag
         commit=commit,
         modified=modified,
         packages={name: version(name) for name in PACKAGES},
+        needs=dict(needs),
+        training=training,
     )
 
 
 def attempt(started: datetime, *, wall_s: float, exit_code: int) -> dict[str, Any]:
     """Describe one run of a command."""
-    text = started.astimezone(UTC).isoformat(timespec="seconds")
+    text = started.astimezone(UTC).isoformat(timespec="milliseconds")
     return {"started": text, "wall_s": round(wall_s, 1), "exit_code": exit_code}
 
 
 def _code() -> tuple[str | None, bool]:
     """Return the commit of the package's repository, and whether the package differs from it."""
     package = Path(__file__).parents[2]
+    if not _git(package, "ls-files", "--error-unmatch", "__init__.py"):
+        return None, False  # installed, perhaps within the repository of something else
     commit = _git(package, "rev-parse", "HEAD")
     changes = _git(package, "status", "--porcelain", "--", ".")
     return commit or None, bool(changes)

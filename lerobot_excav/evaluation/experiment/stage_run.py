@@ -22,6 +22,7 @@ from lerobot_excav.evaluation.experiment.stage_record import (
     read_record,
     record_path,
 )
+from lerobot_excav.evaluation.training import evaluated_training
 
 PATIENCE_S = 20.0
 """How long a stopped command may take to end before it is killed [s]; a guess."""
@@ -34,14 +35,18 @@ class StageRun:
         stage: What to run; nothing may lie at its result.
         environment: Variables for the command, beside those of this process.
         output: The stage's log from `lock_log`; held until the result is in place.
+        needs: When the results that it works on were made, by their stages.
     """
 
-    def __init__(self, stage: Stage, environment: Mapping[str, str], output: IO[str]) -> None:
+    def __init__(
+        self, stage: Stage, environment: Mapping[str, str], output: IO[str], *, needs: Mapping[str, str]
+    ) -> None:
         self.stage = stage
         self.log = Path(output.name)
         self._output = output
         self._command = stage.next_command
         self._environment = environment
+        self._needs = needs
         if not stage.goes_on:
             self._clear()
         self._started, self._clock = datetime.now(UTC), time.monotonic()
@@ -65,7 +70,15 @@ class StageRun:
             self._new_record().write(makes)
 
     def _new_record(self) -> StageRecord:
-        return new_record(self.stage.name, self._command, self._environment)
+        # Read before the command reads it: a training may go on, or be made anew, while its policy plays.
+        training = evaluated_training(self._command)
+        return new_record(
+            self.stage.name,
+            self._command,
+            self._environment,
+            needs=self._needs,
+            training=training.as_dict() if training else None,
+        )
 
     @property
     def exit_code(self) -> int | None:

@@ -6,9 +6,10 @@ import time
 import pytest
 
 from lerobot_excav.errors import ConfigurationError, DatasetError
-from lerobot_excav.evaluation.experiment.runner import run_experiment, state
+from lerobot_excav.evaluation.experiment.runner import run_experiment
 from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
 from lerobot_excav.evaluation.experiment.stage_run import StageRun, lock_log
+from lerobot_excav.evaluation.experiment.stage_state import state
 
 # A command that leaves a trace of every run, then makes its folder.
 COUNTED = """
@@ -61,7 +62,7 @@ def test_a_failed_stage_leaves_no_result_and_is_run_again_from_nothing(experimen
     assert not succeeded
     assert "data: FAILED with exit code 1" in said
     assert not (tmp_path / "data").exists()
-    assert state(broken.stages[0]) == "interrupted"
+    assert state(broken, broken.stages[0]) == "interrupted"
     (tmp_path / "repaired").touch()
     assert run(broken)[0]  # mkdir would fail, were the half result still there
     assert runs(tmp_path) == 2
@@ -116,13 +117,13 @@ def test_a_training_goes_on_under_its_own_command_when_its_runner_was_killed(exp
     training = experiment(RESUMED)
     (stage,) = training.stages
     log = lock_log(log_path(stage.makes), stage.name)
-    wait_for(StageRun(stage, {}, log))
+    wait_for(StageRun(stage, {}, log, needs={}))
     log.close()  # without `finish`: its end is never seen
     (tmp_path / "train.partial").mkdir(exist_ok=True)
     (tmp_path / "train.partial" / "checkpoint").touch()
     assert run(training)[0]
     assert read_record(stage.makes).command == stage.command
-    assert state(stage) == "finished"
+    assert state(training, stage) == "finished"
 
 
 def test_a_training_that_goes_on_with_other_settings_than_the_file_has_says_so(experiment):
@@ -171,8 +172,8 @@ def test_the_record_tells_command_environment_code_and_time(experiment, tmp_path
 def test_a_result_of_another_command_is_kept_and_said(experiment, tmp_path):
     run(experiment(counted()))
     changed = experiment(counted(command="mkdir -p {makes}"))
-    assert state(changed.stages[0]) == "changed"
-    assert "by another command than the file has now" in run(changed)[1]
+    assert state(changed, changed.stages[0]) == "changed"
+    assert "by another command, or in another environment, than the file has now" in run(changed)[1]
     assert runs(tmp_path) == 1
 
 
@@ -183,7 +184,7 @@ def test_a_stage_without_result_runs_every_time_and_shows_its_output(experiment,
         succeeded, said = run(table)
         assert succeeded
         assert said.count("a table") == 2  # the command and what it printed
-    assert state(table.stages[0]) == "always"
+    assert state(table, table.stages[0]) == "always"
 
 
 def test_an_interruption_ends_the_command_and_leaves_no_result(experiment, tmp_path):
@@ -197,7 +198,7 @@ def test_an_interruption_ends_the_command_and_leaves_no_result(experiment, tmp_p
     threading.Thread(target=interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         run(running)
-    assert state(running.stages[0]) == "interrupted"
+    assert state(running, running.stages[0]) == "interrupted"
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
 
@@ -235,7 +236,7 @@ def test_what_another_process_finishes_meanwhile_is_not_run_again(experiment, tm
 def test_a_stage_is_held_until_its_result_is_in_place(experiment, tmp_path):
     (stage,) = experiment(counted()).stages
     log = log_path(stage.makes)
-    running = StageRun(stage, {}, lock_log(log, stage.name))
+    running = StageRun(stage, {}, lock_log(log, stage.name), needs={})
     wait_for(running)
     with pytest.raises(ConfigurationError, match="another process is at stage data"):
         lock_log(log, stage.name)
@@ -268,7 +269,7 @@ def test_a_removed_result_that_appears_whole_gets_a_new_record(experiment, tmp_p
     for word in ("true", "echo"):
         made = experiment(IN_PLACE.replace("WORD", word))
         assert run(made)[0]
-        assert state(made.stages[0]) == "finished"
+        assert state(made, made.stages[0]) == "finished"
         assert len(read_record(tmp_path / "data").attempts) == 1
         (tmp_path / "data").unlink()
 
