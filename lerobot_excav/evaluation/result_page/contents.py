@@ -3,43 +3,18 @@
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
 
 from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.evaluation.result_page.toml_table import TomlTable
 
 CURVES = "curves"
 """Folder of the curves' metrics beside those of the rows, where a page keeps copies."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Table:
-    """A table of the file, whose keys are the fields of the class."""
-
-    @classmethod
-    def read(cls, table: Mapping[str, Any], place: str, **others: Any) -> Self:
-        """Make an object of a table.
-
-        Args:
-            table: The table.
-            place: The file, for messages.
-            others: Fields that do not stand in the table as they are.
-
-        Raises:
-            ConfigurationError: A key is unknown or missing.
-        """
-        names = {field.name for field in fields(cls)}
-        unknown = sorted(set(table) - names)
-        require(not unknown, f"{place}: {unknown} is not known in {cls.__name__}; allowed: {sorted(names)}")
-        try:
-            return cls(**{**table, **others})
-        except TypeError as error:
-            raise ConfigurationError(f"{place}: a {cls.__name__} is incomplete: {error}") from None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row(_Table):
+class Row(TomlTable):
     """A row: one evaluation.
 
     Attributes:
@@ -54,7 +29,7 @@ class Row(_Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section(_Table):
+class Section(TomlTable):
     """A table of rows.
 
     Attributes:
@@ -65,13 +40,13 @@ class Section(_Table):
     """
 
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...] = ()
     text: str = ""
     reference: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class CurveSource(_Table):
+class CurveSource(TomlTable):
     """Evaluations of the checkpoints of one training.
 
     Attributes:
@@ -84,7 +59,7 @@ class CurveSource(_Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clips(_Table):
+class Clips(TomlTable):
     """Clips of one evaluation, side by side in the video grid.
 
     Attributes:
@@ -97,7 +72,7 @@ class Clips(_Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contents(_Table):
+class Contents(TomlTable):
     """Everything on the page.
 
     Attributes:
@@ -111,7 +86,7 @@ class Contents(_Table):
 
     title: str
     metrics: str
-    section: tuple[Section, ...]
+    section: tuple[Section, ...] = ()
     text: str = ""
     curve: tuple[CurveSource, ...] = ()
     clips: tuple[Clips, ...] = ()
@@ -136,8 +111,8 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
             or that of another run of the experiment, with the curves where they lie seen from the file's folder.
 
     Raises:
-        ConfigurationError: The file is missing or damaged, a key is unknown or missing, a row or a
-            curve occurs twice, or a reference is no row.
+        ConfigurationError: The file is missing or damaged, a key is unknown or missing, a value is of another type, a
+            row or a curve occurs twice, or a reference is no row.
     """
     try:
         content = tomllib.loads(path.read_text())
@@ -145,37 +120,27 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
         raise ConfigurationError(f"--rows={path} does not exist") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"--rows={path} is no TOML: {error}") from error
+    contents = Contents.read(content, f"{path}: ")
     if metrics is not None:
-        for table in content.get("curve", ()):
-            table["folder"] = str(_moved(Path(table.get("folder", "")), content.get("metrics", ""), metrics))
-        content["metrics"] = str(metrics)
-    place = str(path)
-    contents = Contents.read(
-        content,
-        place,
-        section=tuple(_section(table, place) for table in content.get("section", ())),
-        curve=tuple(CurveSource.read(table, place) for table in content.get("curve", ())),
-        clips=tuple(
-            Clips.read(table, place, episodes=tuple(table.get("episodes", ())))
-            for table in content.get("clips", ())
-        ),
-    )
-    _check(contents, place)
+        contents = _moved(contents, metrics)
+    _check(contents, str(path))
     return contents
 
 
-def _moved(folder: Path, metrics: str, moved_metrics: Path) -> Path:
+def _moved(contents: Contents, metrics: Path) -> Contents:
+    """Return the contents with the metrics of rows and curves elsewhere."""
+    curves = [
+        replace(curve, folder=str(_moved_curve(Path(curve.folder), contents.metrics, metrics)))
+        for curve in contents.curve
+    ]
+    return replace(contents, metrics=str(metrics), curve=tuple(curves))
+
+
+def _moved_curve(folder: Path, metrics: str, moved_metrics: Path) -> Path:
     """Return where the metrics of a curve lie when those of the rows lie elsewhere."""
     kept = moved_metrics / CURVES / folder.name
-    return (
-        kept
-        if kept.exists()
-        else Path(os.path.normpath(moved_metrics / os.path.relpath(folder, metrics or ".")))
-    )
-
-
-def _section(table: Mapping[str, Any], place: str) -> Section:
-    return Section.read(table, place, rows=tuple(Row.read(row, place) for row in table.get("rows", ())))
+    seen_from_there = Path(os.path.normpath(moved_metrics / os.path.relpath(folder, metrics)))
+    return kept if kept.exists() else seen_from_there
 
 
 def _check(contents: Contents, place: str) -> None:

@@ -4,6 +4,7 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.result_page.contents import read_contents
 
 ROW = '{ label = "a", about = "x" }'
+PAPER = '[[section]]\ntitle = "s"\nrows = [{ label = "a", about = "x", paper = %s }]'
 
 
 @pytest.fixture
@@ -19,18 +20,33 @@ def read(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("colour = 1", r"\['colour'\] is not known in Contents; allowed: .*'section'"),
-        ('[[section]]\ntitle = "s"\nrows = [{ label = "a" }]', "a Row is incomplete: .*about"),
+        ("colour = 1", r"rows\.toml: colour is not known; allowed: .*section"),
+        ('[[section]]\ntitle = "s"\nrows = [{ label = "a" }]', r"section\[0\]\.rows\[0\]\.about is missing"),
         (f'[[section]]\ntitle = "s"\nrows = [{ROW}, {ROW}]', r"\['a'\] stands on the page twice"),
         (f'[[section]]\ntitle = "s"\nreference = "b"\nrows = [{ROW}]', "'b' is no row; allowed: a"),
         ('[[clips]]\nlabel = "b"\nepisodes = [1]', "'b' is no row"),
         ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
         ("[[", "is no TOML"),
+        ("text = 3", "text=3 is no text"),
+        ("section = 3", "section=3 is no list"),
+        ("[section]", r"section=\{\} is no list"),
+        ('[[section]]\ntitle = "s"\nrows = [3]', r"section\[0\]\.rows\[0\]=3 is no table"),
+        (PAPER % "3", r"rows\[0\]\.paper=3 is no table"),
+        (PAPER % '{ success = "96" }', r"rows\[0\]\.paper\.success='96' is no number"),
+        (PAPER % "{ success = true }", r"rows\[0\]\.paper\.success=True is no number"),
+        ('[[clips]]\nlabel = "a"\nepisodes = "abc"', r"clips\[0\]\.episodes='abc' is no list"),
+        ('[[clips]]\nlabel = "a"\nepisodes = [0.5]', r"clips\[0\]\.episodes\[0\]=0.5 is no whole number"),
     ],
 )
 def test_a_file_that_cannot_be_used_says_why(read, text, message):
     with pytest.raises(ConfigurationError, match=message):
         read(text)
+
+
+def test_rows_and_figures_are_read_as_their_fields_say(read):
+    (section,) = read(PAPER % "{ success = 96 }").section
+    assert section.rows[0].paper == {"success": 96.0}
+    assert (section.text, section.reference) == ("", None)
 
 
 def test_a_missing_file_is_named(tmp_path):
