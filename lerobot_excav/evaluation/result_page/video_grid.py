@@ -1,5 +1,7 @@
 """Rollouts side by side: the videos of `lerobot-eval` as tiles of one small video, the mask tinted."""
 
+import logging
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,6 +14,8 @@ from numpy.typing import NDArray
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
+
+logger = logging.getLogger(__name__)
 
 MAX_BYTES = 1_500_000
 """What a video in a repository may weigh."""
@@ -87,7 +91,7 @@ def read_video(path: Path) -> Iterator[Image]:
 
 
 def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
-    """Write clips as one video, in real time, as fine as `MAX_BYTES` allows.
+    """Write clips as one video, in real time, as fine as `MAX_BYTES` allows; warn if the coarsest weighs more.
 
     Shorter clips stand still at their end. The border of a tile is green if its episode succeeded.
 
@@ -102,6 +106,10 @@ def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
         _encode(partial, pictures, quality)
         if partial.stat().st_size <= MAX_BYTES:
             break
+    else:
+        logger.warning(
+            f"{path} weighs {partial.stat().st_size} bytes, more than {MAX_BYTES}; show fewer clips, or shorter ones"
+        )
     partial.replace(path)
 
 
@@ -123,18 +131,21 @@ def _band(tiles: Sequence[Image], width: int) -> Image:
 
 def _tiles(clip: Clip) -> list[Image]:
     """Return the pictures of a clip at the grid's size and rate, tinted and framed."""
-    stride = max(1, round(_rate(clip.path) / FRAMES_PER_SECOND))
+    ticks_per_frame = FRAMES_PER_SECOND / _rate(clip.path)
     colour = SUCCESS_RGB if clip.is_success else FAILURE_RGB
-    return [
-        framed(tinted(enlarged(image), enlarged(_mask_at(clip.masks, number))), colour)
-        for number, image in enumerate(read_video(clip.path))
-        if number % stride == 0
-    ]
+    tiles: list[Image] = []
+    for number, image in enumerate(read_video(clip.path)):
+        # A frame is seen at the grid's ticks until the next one begins: at several, or at none.
+        ticks = math.ceil((number + 1) * ticks_per_frame) - len(tiles)
+        if ticks:
+            tile = framed(tinted(enlarged(image), enlarged(_mask_at(clip.masks, number))), colour)
+            tiles += ticks * [tile]
+    return tiles
 
 
-def _rate(path: Path) -> float:
+def _rate(path: Path) -> Fraction:
     with av.open(str(path)) as container:
-        return float(container.streams.video[0].average_rate)
+        return Fraction(container.streams.video[0].average_rate)
 
 
 def _mask_at(masks: Sequence[ShownMask], frame: int) -> NDArray[np.bool_]:

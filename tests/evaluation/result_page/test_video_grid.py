@@ -10,9 +10,9 @@ from .conftest import write_video
 
 @pytest.fixture
 def clip(tmp_path):
-    def make(name, *, is_success=True, frames=20, marked=(slice(0), slice(0)), since=0):
+    def make(name, *, is_success=True, frames=20, rate=50, marked=(slice(0), slice(0)), since=0):
         path = tmp_path / f"{name}.mp4"
-        write_video(path, frames=frames)
+        write_video(path, frames=frames, rate=rate)
         nothing = np.zeros((24, 32), dtype=bool)
         pixels = nothing.copy()
         pixels[marked] = True
@@ -30,6 +30,16 @@ def test_clips_stand_in_rows_at_half_their_rate(clip, tmp_path):
     assert pictures[0].shape == (2 * 192, 2 * 256, 3)
     assert not list(path.parent.glob("*.partial"))
     assert pictures[0][300, 400].max() < 10  # no clip here
+
+
+@pytest.mark.parametrize("rate", [10, 25, 30, 50])
+def test_clips_of_any_rate_are_shown_in_real_time(clip, tmp_path, rate):
+    write_grid(tmp_path / "grid.mp4", [[clip("a", frames=rate, rate=rate)]])
+    pictures = list(read_video(tmp_path / "grid.mp4"))
+    assert len(pictures) == 25
+    # The clip brightens by 5 a frame.
+    seconds = [picture[96, 128].mean() / 5 / rate for picture in pictures]
+    assert seconds == pytest.approx([tick / 25 for tick in range(25)], abs=1.5 / rate)
 
 
 def test_the_border_tells_success(clip, tmp_path):
@@ -53,13 +63,14 @@ def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
     assert min(outline[6:]) > 200
 
 
-def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch):
+def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch, caplog):
     tried = []
     encode = video_grid._encode
     monkeypatch.setattr(video_grid, "_encode", lambda *a: (tried.append(a[2]), encode(*a)))
     monkeypatch.setattr(video_grid, "MAX_BYTES", 10)
     write_grid(tmp_path / "grid.mp4", [[clip("a")]])
     assert tried == list(video_grid._QUALITIES)
+    assert "bytes, more than 10; show fewer clips, or shorter ones" in caplog.text
 
 
 def test_tinting_and_framing_leave_the_picture_as_it_was():
