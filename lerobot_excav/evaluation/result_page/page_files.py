@@ -16,8 +16,8 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     """Write a page, its data, and the metrics that it is made of.
 
     `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4`, and `metrics/LABEL.jsonl`
-    with `metrics/LABEL.json`, where it comes from. A page can be made anew from these copies; a plot or video that
-    could not be made again, because checkpoints or videos are gone, stays.
+    with `metrics/LABEL.json`, where it comes from. A page can be made anew from these copies; those of an earlier page
+    are removed. A plot or video that could not be made again, because checkpoints or videos are gone, stays.
 
     Args:
         page: The page.
@@ -27,13 +27,7 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
         What was written, but for the copies.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    copies = folder / "metrics"
-    for row in page.rows:
-        _copy_metrics(row.metrics, copies / f"{row.row.label}.jsonl", row.provenance)
-    for curve in page.curves:
-        for point in curve.points:
-            copy = copies / CURVES / curve.name / f"{point.step:06d}.jsonl"
-            _copy_metrics(point.metrics, copy, read_provenance(point.metrics))
+    _keep_metrics(page, folder / "metrics")
     written = _pictures(page, folder)
     beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if (folder / name).exists()]
     texts = {
@@ -46,11 +40,30 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     return [*(folder / name for name in texts), *written]
 
 
-def _copy_metrics(metrics: Path, copy: Path, provenance: Provenance) -> None:
+def _keep_metrics(page: ResultPage, folder: Path) -> None:
+    """Copy what the page is made of, and remove what an earlier one was: a page made of the copies must be the same."""
+    copies = [
+        _copy_metrics(row.metrics, folder / f"{row.row.label}.jsonl", row.provenance) for row in page.rows
+    ]
+    for curve in page.curves:
+        for point in curve.points:
+            copy = folder / CURVES / curve.name / f"{point.step:06d}.jsonl"
+            copies.append(_copy_metrics(point.metrics, copy, read_provenance(point.metrics)))
+    if Path(page.contents.metrics).resolve() == folder.resolve():
+        return  # made of the copies themselves
+    for kept in [*folder.glob("*.jsonl"), *folder.glob(f"{CURVES}/*/*.jsonl")]:
+        # Only a page's own copies tell beside them where they come from.
+        if kept not in copies and (origin := kept.with_suffix(".json")).exists():
+            kept.unlink()
+            origin.unlink()
+
+
+def _copy_metrics(metrics: Path, copy: Path, provenance: Provenance) -> Path:
     copy.parent.mkdir(parents=True, exist_ok=True)
     if metrics.resolve() != copy.resolve():
         shutil.copyfile(metrics, copy)
     copy.with_suffix(".json").write_text(json.dumps(provenance.as_dict(), indent=1) + "\n")
+    return copy
 
 
 def _pictures(page: ResultPage, folder: Path) -> list[Path]:
