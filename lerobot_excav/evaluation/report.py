@@ -76,7 +76,7 @@ def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) 
         operator=_who(operator) if operator else None,
         bootstrap_seed=seed,
         notes=[
-            *(note for run in rows for note in _notes(run)),
+            *(note for run in rows for note in file_notes(run)),
             *(f"no paired differences to {label}: {reason}" for label, reason in unlike.items() if reason),
         ],
     )
@@ -86,7 +86,8 @@ def _who(operator: Run) -> str:
     return operator.evaluations[0].operator or "not stated"
 
 
-def _notes(run: Run) -> list[str]:
+def file_notes(run: Run) -> list[str]:
+    """Say which files of a run hold more than was used of them."""
     return [
         f"{evaluation.path} holds {evaluation.of} evaluations; the last one is used"
         for evaluation in run.evaluations

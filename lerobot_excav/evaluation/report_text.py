@@ -6,7 +6,7 @@ from lerobot_excav.evaluation.comparison import Difference
 from lerobot_excav.evaluation.report import Report
 from lerobot_excav.evaluation.run_summary import RateOf, RunSummary, Value
 from lerobot_excav.evaluation.statistics import Interval
-from lerobot_excav.evaluation.task_table import Column, TaskTable
+from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
 
 
 def report_text(report: Report) -> str:
@@ -28,6 +28,9 @@ def _legend(report: Report) -> list[str]:
         f"Simulation: {simulations(report.runs)}.",
         *report.runs[0].table.legend(report.operator),
     ]
+    ratios = [column.header for column in report.runs[0].table.columns if column.kind is Kind.RATIO]
+    if ratios and report.operator is None:
+        lines.append(f"For {', '.join(ratios)} give an operator's run on the same scenes: --operator=FILE.")
     if report.differences:
         lines.append(
             "Differences are paired by scene and target; those of rates with Newcombe's interval and p from McNemar's "

@@ -52,7 +52,7 @@ class ScoopEpisode(Episode):
 
 def _legend(operator: str | None) -> list[str]:
     if operator is None:
-        return ["Efficiency needs an operator's run on the same scenes: --operator=FILE."]
+        return []
     return [
         f"Efficiency: retained mass over the operator's on the same scenes and targets; operator: {operator}."
     ]

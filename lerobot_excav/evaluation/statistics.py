@@ -175,7 +175,7 @@ def newcombe_interval(both: int, first_only: int, second_only: int, neither: int
 def _cautious_correlation(both: int, first_only: int, second_only: int, neither: int) -> float:
     """Correlate two truth values, a positive correlation corrected for continuity; 0 where one never changes."""
     n = both + first_only + second_only + neither
-    excess = both * neither - first_only * second_only
+    excess: float = both * neither - first_only * second_only
     if excess > 0:
         excess = max(0.0, excess - n / 2)
     firsts, seconds = both + first_only, both + second_only

@@ -4,9 +4,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.provenance import read_provenance
 from lerobot_excav.evaluation.result_page.contents import CurveSource
+from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import Interval, wilson_interval
 
 
@@ -17,18 +19,37 @@ class CurvePoint:
     Attributes:
         step: Its training step.
         minutes: Training time up to it [min]; None if no log tells.
-        scene_set: Scenes that it played.
-        n: Episodes.
+        run: The episodes, all in scenes of one set.
         success: Rate with Wilson interval.
-        metrics: The metrics file.
     """
 
     step: int
     minutes: float | None
-    scene_set: str
-    n: int
+    run: Run
     success: Interval
-    metrics: Path
+
+    @property
+    def scene_set(self) -> str:
+        """Scenes that it played."""
+        return self.run.episodes[0].scene_set
+
+    @property
+    def setting(self) -> str:
+        """What tells its task's runs apart, in words."""
+        first = self.run.episodes[0]
+        return ", ".join(
+            f"{header} {getattr(first, field)}" for header, field in self.run.table.setting.items()
+        )
+
+    @property
+    def n(self) -> int:
+        """Episodes."""
+        return len(self.run.episodes)
+
+    @property
+    def metrics(self) -> Path:
+        """The metrics file."""
+        return self.run.evaluations[0].path
 
     def as_dict(self) -> dict[str, Any]:
         """Return the point as plain data."""
@@ -59,7 +80,8 @@ def read_curve(source: CurveSource) -> Curve:
     """Read the evaluations of a training's checkpoints that are there: `STEP/metrics.jsonl` or `STEP.jsonl`.
 
     Raises:
-        DatasetError: A metrics file cannot be used.
+        ConfigurationError: An evaluation mixes conditions.
+        DatasetError: A metrics file cannot be used, or the checkpoints played different sets of scenes or conditions.
     """
     folder = Path(source.folder)
     files = {
@@ -67,20 +89,36 @@ def read_curve(source: CurveSource) -> Curve:
         for path in folder.glob("[0-9]*/metrics.jsonl")
         if path.parent.name.isdigit()
     }
-    files |= {int(path.stem): path for path in folder.glob("[0-9]*.jsonl")}
+    files |= {int(path.stem): path for path in folder.glob("[0-9]*.jsonl") if path.stem.isdigit()}
     points = tuple(_point(step, files[step]) for step in sorted(files))
+    for point in points:
+        _require_alike(points[0], point)
     return Curve(label=source.label, name=folder.name, points=points)
 
 
 def _point(step: int, metrics: Path) -> CurvePoint:
-    evaluation = read_evaluation(metrics)
-    episodes = list(evaluation.episodes.values())
+    run = Run(label=str(metrics), evaluations=(read_evaluation(metrics),))
+    sets = sorted({episode.scene_set for episode in run.episodes})
+    if len(sets) > 1:
+        raise DatasetError(
+            f"{metrics} mixes scenes of {' and '.join(sets)}; a point of a curve is of one set"
+        )
     training = read_provenance(metrics).training
     return CurvePoint(
         step=step,
         minutes=training.minutes if training else None,
-        scene_set=episodes[0].scene_set,
-        n=len(episodes),
-        success=wilson_interval(sum(episode.is_success for episode in episodes), len(episodes)),
-        metrics=metrics,
+        run=run,
+        success=wilson_interval(sum(episode.is_success for episode in run.episodes), len(run.episodes)),
     )
+
+
+def _require_alike(first: CurvePoint, point: CurvePoint) -> None:
+    """Raise `DatasetError` unless two checkpoints played one task in scenes of one set under equal conditions."""
+    played = [{"task": p.run.table.task, "scene_set": p.scene_set, **p.run.constants} for p in (first, point)]
+    unlike = [name for name, value in played[0].items() if played[1].get(name) != value]
+    if unlike:
+        name = unlike[0]
+        raise DatasetError(
+            f"{first.metrics} has {name}={played[0][name]!r} and {point.metrics} {played[1].get(name)!r}; "
+            "the points of a curve differ in their training only: put them into folders of their own"
+        )

@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.evaluation.comparison import Difference, compare
+from lerobot_excav.errors import require
+from lerobot_excav.evaluation.comparison import Difference, compare, require_same_task
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.provenance import Provenance, read_provenance
+from lerobot_excav.evaluation.report import file_notes
 from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
 from lerobot_excav.evaluation.result_page.curves import Curve, read_curve
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, summarise
+from lerobot_excav.evaluation.task_table import TaskTable
 from lerobot_excav.evaluation.training import Training
 
 
@@ -127,6 +130,13 @@ class ResultPage:
         }
         return list(found.values())
 
+    @property
+    def notes(self) -> list[str]:
+        """What a reader has to know about the files."""
+        runs = [row.run for row in self.rows]
+        runs += [point.run for curve in self.curves for point in curve.points]
+        return [note for run in runs for note in file_notes(run)]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the page as plain data."""
         return {
@@ -134,6 +144,7 @@ class ResultPage:
             "sections": [section.as_dict() for section in self.sections],
             "curves": [curve.as_dict() for curve in self.curves],
             "bootstrap_seed": self.bootstrap_seed,
+            "notes": self.notes,
         }
 
 
@@ -145,7 +156,9 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
         seed: Seed of the bootstrap.
 
     Raises:
-        DatasetError: A metrics file cannot be used, or rows cannot be compared.
+        ConfigurationError: A figure of the paper has no column, or an evaluation mixes conditions.
+        DatasetError: A metrics file cannot be used, rows of a section are of different tasks or cannot be compared, or
+            so are the points of a curve.
     """
     rng = np.random.default_rng(seed)
     rows = {row.label: _row(contents, row, rng) for row in contents.rows if _is_run(contents, row)}
@@ -170,6 +183,10 @@ def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
     present = [rows[row.label] for row in section.rows if row.label in rows]
     reference = rows.get(section.reference or "")
+    for row in present:
+        require_same_task((reference or present[0]).run, row.run)
+    if present:
+        _require_known_figures(section, present[0].summary.table)
     return PageSection(
         section=section,
         rows=present,
@@ -178,6 +195,16 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
             _difference(reference.run, row.run, rng) for row in present if reference and row is not reference
         ],
     )
+
+
+def _require_known_figures(section: Section, table: TaskTable) -> None:
+    """Raise `ConfigurationError` unless every figure of the paper stands beside a column, also in rows not yet run."""
+    for row in section.rows:
+        for key in row.paper or {}:
+            require(
+                key in table.compared,
+                f"row {row.label!r}: paper.{key} has no column; allowed: {', '.join(table.compared)}",
+            )
 
 
 def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDifference:

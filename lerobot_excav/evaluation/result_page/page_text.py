@@ -11,7 +11,7 @@ from lerobot_excav.evaluation.report_text import (
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.curves import Curve, CurvePoint
 from lerobot_excav.evaluation.result_page.page import PageDifference, PageRow, PageSection, ResultPage
-from lerobot_excav.evaluation.task_table import Column, Kind
+from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
 from lerobot_excav.evaluation.training import Training
 
 CURVE_PLOT = "success.png"
@@ -84,7 +84,8 @@ def _outcome_cells(row: PageRow, columns: Sequence[Column], in_paper: Sequence[C
 def _choices(rows: Sequence[PageRow]) -> list[str]:
     """Lay out the other measures."""
     table = rows[0].summary.table
-    columns = [column for column in table.columns if column.key not in table.compared]
+    # A page has no operator's run to relate anything to.
+    columns = [c for c in table.columns if c.key not in table.compared and c.kind is not Kind.RATIO]
     header = ["setting", *table.setting, "n", *(_full_header(column) for column in columns)]
     return markdown_table(
         header,
@@ -102,26 +103,25 @@ def _differences(section: PageSection) -> list[str]:
     if not lines:
         return []
     reference = section.differences[0].reference
-    header = [
-        "setting",
-        *section.rows[0].summary.table.setting,
-        "scenes",
-        f"success minus `{reference}` [%]",
-        "p",
-    ]
+    table = section.rows[0].summary.table
+    header = ["setting", *table.setting, "scenes", f"{_decisive(table).header} minus `{reference}`", "p"]
     return markdown_table(header, lines)
 
 
 def _difference(row: PageRow, difference: PageDifference) -> list[str]:
-    table = row.summary.table
-    first = next(d for d in difference.differences if d.p_value is not None)
-    column = next(table.column(key) for key in table.compared if table.column(key).field == first.measure)
+    column = _decisive(row.summary.table)
+    decisive = next(d for d in difference.differences if d.measure == column.field)
     return [
         row.row.about,
         *row.summary.setting.values(),
         str(difference.scenes),
-        *difference_cells(column, first),
+        *difference_cells(column, decisive),
     ]
+
+
+def _decisive(table: TaskTable) -> Column:
+    """Return the first rate that is compared."""
+    return next(column for key in table.compared if (column := table.column(key)).kind is Kind.RATE)
 
 
 def _curves(curves: Sequence[Curve], files: Sequence[str]) -> list[str]:
@@ -137,14 +137,14 @@ def _curves(curves: Sequence[Curve], files: Sequence[str]) -> list[str]:
             if CURVE_PLOT in files
             else []
         ),
-        *markdown_table(("policy", "step", "minutes", "n", "success [%]"), rows),
+        *markdown_table(("policy", "played with", "step", "minutes", "n", "success [%]"), rows),
         "",
     ]
 
 
 def _point(curve: Curve, point: CurvePoint) -> list[str]:
     success = value_text(_SUCCESS, point.success)
-    return [curve.label, str(point.step), _number(point.minutes), str(point.n), success]
+    return [curve.label, point.setting, str(point.step), _number(point.minutes), str(point.n), success]
 
 
 _SUCCESS = Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success")
@@ -198,16 +198,27 @@ def _legend(page: ResultPage) -> list[str]:
     lines = [
         "Brackets: 95 % intervals; Wilson's for rates over episodes, bootstrap for means over scenes and targets "
         f"(seed {page.bootstrap_seed}).",
-        *page.rows[0].summary.table.legend(None),
+        *_measures(page),
         "Differences are paired by scene and target, on the scenes that both have played; with Newcombe's interval for "
         "paired rates, p from McNemar's exact test.",
         "One training seed per policy: the intervals say nothing about how trainings differ.",
         f"Simulation: {simulations([row.summary for row in page.rows])}.",
         "Machine-readable: [report.json](report.json), a line per row in [rows.jsonl](rows.jsonl); every episode: "
         "[metrics](metrics).",
+        *(f"{note}." for note in page.notes),
     ]
     versions = _packages(page)
     return [*lines, f"Versions: {versions}."] if versions else lines
+
+
+def _measures(page: ResultPage) -> list[str]:
+    """Explain the measures, task by task."""
+    tables = {row.summary.table.task: row.summary.table for row in page.rows}
+    return [
+        f"{task}: {line}" if len(tables) > 1 else line
+        for task, table in tables.items()
+        for line in table.legend(None)
+    ]
 
 
 def _packages(page: ResultPage) -> str:

@@ -60,6 +60,18 @@ def write_training(tmp_path):
     return write
 
 
+@pytest.fixture
+def read_rows(tmp_path):
+    """Read what stands on a page, from TOML after `metrics`."""
+
+    def read(text, **options):
+        path = tmp_path / "rows.toml"
+        path.write_text(f'title = "t"\nmetrics = "{tmp_path}/test"\n{text}')
+        return read_contents(path, **options)
+
+    return read
+
+
 def write_record(folder, command):
     record = {
         "stage": folder.name,

@@ -1,9 +1,10 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
 
-from lerobot_excav.errors import DatasetError
+from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.result_page import video_grid
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
 from lerobot_excav.evaluation.result_page.page import make_page
@@ -110,6 +111,83 @@ def test_a_page_can_be_made_anew_from_its_copies(finished, tmp_path):
     again = make_page(contents(tmp_path, metrics=out / "metrics"))
     write_page(again, out)
     assert (out / "report.md").read_text() == first
+
+
+def test_what_an_earlier_page_was_made_of_does_not_come_back(finished, tmp_path):
+    out = tmp_path / "results"
+    write_page(make_page(finished), out)
+    by_hand = out / "metrics" / "other.jsonl"
+    by_hand.write_text("{}")
+    shutil.rmtree(tmp_path / "val" / "paired" / "001000")
+    shutil.rmtree(tmp_path / "test" / "zero")
+    write_page(make_page(finished), out)
+    again = make_page(contents(tmp_path, metrics=out / "metrics"))
+    assert [point.step for point in again.curves[0].points] == [2000]
+    assert again.sections[0].missing == ["zero", "later"]
+    assert not (out / "metrics" / "zero.json").exists()
+    assert by_hand.exists()
+
+
+def test_a_page_made_of_its_copies_removes_none_of_them(finished, tmp_path, read_rows):
+    out = tmp_path / "results"
+    write_page(make_page(finished), out)
+    before = sorted(out.rglob("*"))
+    row = '[[section]]\ntitle = "s"\nrows = [{ label = "paired", about = "x" }]'
+    write_page(make_page(read_rows(row, metrics=out / "metrics")), out)
+    assert sorted(out.rglob("*")) == before
+
+
+@pytest.mark.parametrize("key", ["succes", "target_selection"])
+def test_a_figure_of_the_paper_without_a_column_is_refused(finished, read_rows, key):
+    rows = f'{{ label = "paired", about = "x" }}, {{ label = "later", about = "x", paper = {{ {key} = 9 }} }}'
+    page = read_rows(f'[[section]]\ntitle = "s"\nrows = [{rows}]')
+    with pytest.raises(ConfigurationError, match=f"'later': paper.{key} has no .* success, episode_return"):
+        make_page(page)
+
+
+def test_a_file_of_several_evaluations_is_told(finished, tmp_path):
+    for name in ("test/zero", "val/paired/001000"):
+        path = tmp_path / name / "metrics.jsonl"
+        path.write_text(2 * path.read_text())
+    page = make_page(finished)
+    assert [note.rpartition("/metrics.jsonl ")[::2] for note in page.notes] == [
+        (f"{tmp_path}/{name}", "holds 2 evaluations; the last one is used")
+        for name in ("test/zero", "val/paired/001000")
+    ]
+    assert f"- {page.notes[0]}.\n" in page_text(page)
+
+
+TWO_ROWS = 'rows = [{ label = "scoop", about = "digs" }, { label = "paired", about = "grasps" }]'
+
+
+@pytest.fixture
+def scoop(finished, write_evaluation, metrics_line, tmp_path):
+    """Evaluations of the other task, beside those of this one."""
+    write_evaluation("test/scoop", [metrics_line(i) for i in range(4)], tmp_path / "gone")
+    lines = [metrics_line(i, mask_condition="zero", target_success=False) for i in range(4)]
+    write_evaluation("test/scoop-zero", lines, tmp_path / "gone")
+
+
+@pytest.mark.usefixtures("scoop")
+def test_tasks_are_not_mixed_in_a_section(read_rows):
+    with pytest.raises(
+        DatasetError, match=r"scoop is of Scoop-v0 and paired of FR5Grasp-v0; report them apart"
+    ):
+        make_page(read_rows(f'[[section]]\ntitle = "s"\n{TWO_ROWS}'))
+
+
+@pytest.mark.usefixtures("scoop")
+def test_sections_of_different_tasks_are_explained_task_by_task(read_rows):
+    page = read_rows(
+        '[[section]]\ntitle = "a"\nreference = "scoop"\n'
+        'rows = [{ label = "scoop", about = "x" }, { label = "scoop-zero", about = "y" }]\n'
+        '[[section]]\ntitle = "b"\nrows = [{ label = "paired", about = "z" }]'
+    )
+    text = page_text(make_page(page))
+    assert "target success [%] minus `scoop`" in text
+    assert "-100.0 [-100.0, -30.7]" in text
+    assert "- FR5Grasp-v0: Placed: " in text
+    assert "efficiency" not in text.lower()  # needs an operator's run, which a page has not
 
 
 def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line, write_evaluation):
