@@ -1,6 +1,7 @@
 """The README of a checkpoint, in the form of LeRobot's model cards."""
 
 import json
+import math
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -79,7 +80,7 @@ def front_matter(facts: CardFacts, dataset: str | None) -> str:
 
 
 def description(config: MaskACTConfig) -> str:
-    """Say what the policy does and which of its inputs point at the target."""
+    """Say what the policy sees and does, and which of its inputs point at the target."""
     paths = ["a fourth channel of the main camera"]
     if config.target_token:
         paths.append("a token pooled under the mask")
@@ -88,8 +89,11 @@ def description(config: MaskACTConfig) -> str:
         if config.withhold_mask
         else f"A binary mask of the main camera names the target; the network reads it as {' and '.join(paths)}."
     )
+    views = "four-channel views"
+    if config.coordinate_channels:
+        views += ", to which the network adds the row and column of every pixel as two more channels"
     return (
-        "[Action chunking with transformers](https://arxiv.org/abs/2304.13705) over four-channel views, trained with "
+        f"[Action chunking with transformers](https://arxiv.org/abs/2304.13705) over {views}; trained with "
         f"[LeRobot](https://github.com/huggingface/lerobot). {condition} Weights are in half precision and without "
         "what only training needs."
     )
@@ -113,6 +117,7 @@ def network_facts(config: MaskACTConfig, parameters: int) -> dict[str, str]:
         "Width": str(config.dim_model),
         "Actions per plan": f"{config.chunk_size}, of which {config.n_action_steps} are executed",
         "Target token": "yes" if config.target_token else "no",
+        "Coordinate channels": "yes" if config.coordinate_channels else "no",
     }
 
 
@@ -130,7 +135,7 @@ def training_facts(checkpoint: Path) -> dict[str, str]:
     facts = {
         "Dataset": dataset["repo_id"],
         "Episodes": len(dataset["episodes"]) if dataset.get("episodes") else "all",
-        "Held out for validation": f"{100 * (dataset.get('eval_split') or 0):g} %",
+        "Held out for validation": _held_out(dataset),
         "Steps": step,
         "Batch size": settings["batch_size"],
         "Learning rate": optimizer.get("lr"),
@@ -138,6 +143,14 @@ def training_facts(checkpoint: Path) -> dict[str, str]:
         "LeRobot": version("lerobot"),
     }
     return {name: str(value) for name, value in facts.items() if value is not None}
+
+
+def _held_out(dataset: dict[str, Any]) -> str:
+    """Say how many episodes a training did not learn from, rounded as LeRobot does, or which share of all."""
+    share = dataset.get("eval_split") or 0.0
+    if not dataset.get("episodes"):
+        return f"{100 * share:g} %"
+    return str(math.ceil(len(dataset["episodes"]) * share))
 
 
 def fact_table(facts: dict[str, str]) -> str:

@@ -44,9 +44,23 @@ def test_the_front_matter_is_what_the_hub_reads(trained, config):
 
 def test_the_card_tells_how_the_policy_was_trained(trained, config):
     card = model_card(trained, config(), 1, CardFacts())
-    rows = ["Episodes | 3", "Steps | 4000", "Batch size | 16", "Learning rate | 0.0003", "Seed | 7", "20 %"]
+    rows = ["Episodes | 3", "Steps | 4000", "Batch size | 16", "Learning rate | 0.0003", "Seed | 7"]
     assert [row for row in rows if row not in card] == []
     assert "/data" not in card
+
+
+@pytest.mark.parametrize(
+    ("dataset", "held_out"),
+    [
+        ({"episodes": list(range(200)), "eval_split": 0.1975}, "40"),
+        ({"episodes": [0, 1, 2], "eval_split": 0.0}, "0"),
+        ({"episodes": None, "eval_split": 0.1975}, "19.75 %"),
+    ],
+)
+def test_the_card_counts_the_held_out_episodes_where_it_can(trained, config, dataset, held_out):
+    settings = {**SETTINGS, "dataset": {"repo_id": "local/grasping", **dataset}}
+    (trained / "train_config.json").write_text(json.dumps(settings))
+    assert f"| Held out for validation | {held_out} |" in model_card(trained, config(), 1, CardFacts())
 
 
 def test_without_training_settings_the_card_does_not_speak_of_training(tmp_path, config):
@@ -69,6 +83,13 @@ def test_the_card_tells_which_paths_the_mask_has(tmp_path, config):
     assert "fourth channel of the main camera." in plain
     assert "and a token pooled under the mask" in token
     assert "no-condition variant" in blind
+
+
+@pytest.mark.parametrize(("channels", "word"), [(True, "yes"), (False, "no")])
+def test_the_card_tells_whether_pixels_have_coordinates(tmp_path, config, channels, word):
+    card = model_card(tmp_path, config(coordinate_channels=channels), 1, CardFacts())
+    assert f"| Coordinate channels | {word} |" in card
+    assert ("row and column of every pixel" in card) == channels
 
 
 def test_facts_make_title_command_and_results(tmp_path, config):
