@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from typing import override
 
+from lerobot_excav.envs.fr5.layout import NO_BLOCK
 from lerobot_excav.evaluation.episode import Episode
 from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
-
-NO_BLOCK = -1
-"""`first_grasped_block` of an episode in which no block was lifted."""
 
 COMMANDED, OTHER, NONE = GRASPED = ("commanded", "other", "none")
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.fr5.features import CAMERAS, STATE_NAMES
-from lerobot_excav.envs.fr5.layout import BLOCK_COUNT
+from lerobot_excav.envs.fr5.layout import BLOCK_COUNT, NO_BLOCK
 from lerobot_excav.envs.fr5.rendering import WorkcellRenderer
 from lerobot_excav.envs.fr5.scene import GraspScene, draw_scene
 from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION
-from lerobot_excav.envs.fr5.task import NO_BLOCK, GraspTask
+from lerobot_excav.envs.fr5.task import GraspTask
 from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW, Workcell
 from lerobot_excav.envs.mask_condition import conditioned_mask, corruption_rng
 from lerobot_excav.envs.mask_noise import noisy_mask

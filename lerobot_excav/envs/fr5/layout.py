@@ -12,6 +12,8 @@ BASE_POS_W = (0.5, 0.5, 0.0)
 """Foot of the arm, not turned: it works towards -x (kind: paper)."""
 
 BLOCK_COUNT = 4
+NO_BLOCK = -1
+"""What stands for none of the blocks where an index is expected."""
 BLOCK_SIZE_M = 0.04  # edge (kind: paper)
 BLOCK_MASS_KG = 0.05  # kind: paper
 BLOCK_FRICTION = (1.0, 0.005, 0.0001)  # painted wood on a table top (kind: guess)

@@ -10,7 +10,6 @@ from lerobot_excav.envs.fr5.scene import GraspScene
 from lerobot_excav.envs.fr5.workcell import Workcell
 from lerobot_excav.errors import require
 
-NO_BLOCK = -1
 LIFT_M = 0.02
 """Height above its place on the table from which a block counts as lifted [m] (kind: guess, half its edge)."""
 REST_SPEED_M_S = 0.05
@@ -60,7 +59,7 @@ class GraspTask:
         self.scene = scene
         self._workcell = workcell
         self._commanded = [_checked_target(target_id)]
-        self._first_grasped = NO_BLOCK
+        self._first_grasped = layout.NO_BLOCK
         self._return = 0.0
         self._max_reward = 0.0
         self._frames = 0
@@ -81,14 +80,14 @@ class GraspTask:
             ConfigurationError: There is no such block.
         """
         self._commanded.append(_checked_target(target_id))
-        self._first_grasped = NO_BLOCK
+        self._first_grasped = layout.NO_BLOCK
 
     def update(self) -> float:
         """Look at the cell after a frame, and return the frame's reward."""
         already_lifted = self._lifted
         self._look()
         lifted = np.flatnonzero(self._lifted & ~already_lifted)
-        if self._first_grasped == NO_BLOCK and lifted.size:
+        if self._first_grasped == layout.NO_BLOCK and lifted.size:
             self._first_grasped = int(lifted[0])
         reward = self._reward()
         self._return += reward

@@ -3,7 +3,7 @@ import pytest
 
 from lerobot_excav.envs.fr5 import layout
 from lerobot_excav.envs.fr5.scene import draw_scene
-from lerobot_excav.envs.fr5.task import NO_BLOCK, TASK_STATE_NAMES, GraspTask
+from lerobot_excav.envs.fr5.task import TASK_STATE_NAMES, GraspTask
 from lerobot_excav.errors import ConfigurationError
 
 SCENE = draw_scene("train", 2)
@@ -31,7 +31,7 @@ def test_nothing_done_is_worth_nothing(task, workcell):
     hold(workcell)
     assert task.update() == 0.0
     assert not task.is_success
-    assert task.episode_metrics["first_grasped_block"] == NO_BLOCK
+    assert task.episode_metrics["first_grasped_block"] == layout.NO_BLOCK
 
 
 def test_the_commanded_block_alone_in_the_tray_is_success(task, workcell):
@@ -63,8 +63,8 @@ def test_after_a_change_of_command_the_first_grasped_block_is_asked_anew(task, w
 
     assert grasp(2) == 2
     task.retarget(3)
-    assert grasp(2) == NO_BLOCK  # still held from before
-    assert grasp(None) == NO_BLOCK
+    assert grasp(2) == layout.NO_BLOCK  # still held from before
+    assert grasp(None) == layout.NO_BLOCK
     assert grasp(3) == 3
     assert task.episode_metrics["target_grasped"]
     assert grasp(None) == 3
@@ -162,7 +162,7 @@ def test_the_first_grasped_block_is_remembered_when_another_is_lifted(task, work
 @pytest.mark.parametrize(("pads", "reward"), [(0, 0.0), (1, 0.0), (2, 2.0)])
 def test_a_block_is_lifted_by_both_fingers_only(task, workcell, monkeypatch, pads, reward):
     assert lift(task, workcell, monkeypatch, 1, pads) == reward
-    assert task.episode_metrics["first_grasped_block"] == (1 if pads == 2 else NO_BLOCK)
+    assert task.episode_metrics["first_grasped_block"] == (1 if pads == 2 else layout.NO_BLOCK)
 
 
 def test_task_state_tells_of_the_commanded_block(task, workcell):
@@ -172,7 +172,7 @@ def test_task_state_tells_of_the_commanded_block(task, workcell):
     distance = np.linalg.norm(workcell.block_pos_w[1] - workcell.grasp_pos_w)
     assert state["gripper_to_target_m"] == pytest.approx(distance, rel=1e-6)
     assert state["target_height_m"] == pytest.approx(0.0, abs=1e-3)
-    assert state["first_grasped_block"] == NO_BLOCK
+    assert state["first_grasped_block"] == layout.NO_BLOCK
 
 
 def test_a_new_command_is_what_success_is_judged_by(task, workcell):
