@@ -16,11 +16,11 @@
     resume_from = "{makes}/checkpoints/last/pretrained_model/train_config.json"
     resume = "lerobot-train --config_path={resume_from} --resume=true"
 
-A command is run by bash, as one line. A stage may need all earlier ones that match a pattern (`train-*`). `{makes}` is
-`….partial` while the command runs, unless `appears_whole = true`.
+A command is run by bash, as one line; `${NAME}` is left to it. Paths are relative to the folder in which the experiment
+is run. A stage may need all earlier ones that match a pattern (`train-*`). `{makes}` is `….partial` while the command
+runs, unless `appears_whole = true`.
 """
 
-import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,12 +30,25 @@ from typing import Any
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.evaluation.experiment.stage import Resumption, Stage, workspace_of
+from lerobot_excav.evaluation.experiment.words import Words, fill, fill_command, fill_path
 
-Words = Mapping[str, str]
-
-_WORD = re.compile(r"\{(\w+)\}")
-_STAGE_KEYS = ("name", "each", "needs", "makes", "command", "appears_whole", "resume_from", "resume")
-_DEEPEST_NESTING = 10
+_TABLES = {"settings": dict, "environment": dict, "stage": list}
+_STAGE_KEYS = {
+    "name": str,
+    "each": list,
+    "needs": list,
+    "makes": str,
+    "command": str,
+    "appears_whole": bool,
+    "resume_from": str,
+    "resume": str,
+}
+_TYPES = {
+    str: "text; put it in quotes",
+    bool: "truth value; write true or false, without quotes",
+    list: "list; put it in brackets",
+    dict: "table; give NAME = VALUE pairs",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,17 +95,16 @@ def read_experiment(path: Path, settings: Words | None = None) -> Experiment:
         settings: Values in place of those of the file.
 
     Raises:
-        ConfigurationError: The file is missing or damaged, names an unknown word or stage, or has a stage twice.
+        ConfigurationError: The file is missing or damaged, has an entry that cannot be used, or has a stage twice.
     """
     content = _content(path)
-    words = {name: str(value) for name, value in content.get("settings", {}).items()}
+    words = _texts(content.get("settings", {}))
     for name in settings or {}:
         require_choice("--set", name, list(words))
     words |= settings or {}
     stages = [stage for table in content.get("stage", []) for stage in _stages(table, words, path)]
     stages = _with_needs(stages, path)
-    environment = {name: str(value) for name, value in content.get("environment", {}).items()}
-    return Experiment(path=path, stages=tuple(stages), environment=environment)
+    return Experiment(path=path, stages=tuple(stages), environment=_texts(content.get("environment", {})))
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -102,22 +114,32 @@ def _content(path: Path) -> dict[str, Any]:
         raise ConfigurationError(f"{path} does not exist; name the TOML file of an experiment") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path} is no TOML: {error}") from error
-    for name in content:
-        require_choice(f"{path}: table", name, ("settings", "environment", "stage"))
+    for name, value in content.items():
+        require_choice(f"{path}: table", name, list(_TABLES))
+        _require_type(f"{path}: {name}", value, _TABLES[name])
+    for table in content.get("stage", []):
+        _require_type(f"{path}: stage", table, dict)
     return content
 
 
+def _require_type(place: str, value: Any, kind: type) -> None:
+    require(isinstance(value, kind), f"{place}={value!r} is no {_TYPES[kind]}")
+
+
 def _stages(table: dict[str, Any], settings: Words, path: Path) -> list[Stage]:
-    for key in table:
-        require_choice(f"{path}: key of a stage", key, _STAGE_KEYS)
+    for key, value in table.items():
+        require_choice(f"{path}: key of a stage", key, list(_STAGE_KEYS))
+        _require_type(f"{path}: a stage's {key}", value, _STAGE_KEYS[key])
     for key in ("name", "command"):
         require(key in table, f"{path}: a stage lacks {key!r}: {table}")
-    for key in ("name", "makes", "command", "resume_from", "resume"):
-        value = table.get(key, "")
-        require(isinstance(value, str), f"{path}: {key}={value!r} of a stage is no text; put it in quotes")
-    for key in ("each", "needs"):
-        value = table.get(key, [])
-        require(isinstance(value, list), f"{path}: {key}={value!r} of a stage is no list; put it in brackets")
+    for row in table.get("each", []):
+        _require_type(f"{path}: entry of a stage's each", row, dict)
+    for need in table.get("needs", []):
+        _require_type(f"{path}: entry of a stage's needs", need, str)
+    require(
+        table.get("each") != [],
+        f"{path}: each=[] makes no stage {table['name']!r}; give a table per stage, or leave `each` out",
+    )
     return [_stage(table, {**settings, **_texts(row)}, path) for row in table.get("each", [{}])]
 
 
@@ -127,13 +149,13 @@ def _texts(row: Mapping[str, Any]) -> dict[str, str]:
 
 def _stage(table: dict[str, Any], words: Words, path: Path) -> Stage:
     place = f"{path}: {fill(table['name'], words, str(path))}"
-    makes = Path(fill(table["makes"], words, place)) if "makes" in table else None
-    appears_whole = bool(table.get("appears_whole", False))
+    makes = fill_path(table["makes"], words, place) if "makes" in table else None
+    appears_whole = table.get("appears_whole", False)
     workspace = workspace_of(makes, appears_whole=appears_whole)
     words = words if workspace is None else {**words, "makes": str(workspace)}
     return Stage(
         name=fill(table["name"], words, place),
-        command=_command(table["command"], words, place),
+        command=fill_command(table["command"], words, place),
         makes=makes,
         needs=tuple(fill(need, words, place) for need in table.get("needs", ())),
         appears_whole=appears_whole,
@@ -145,40 +167,9 @@ def _resumption(table: dict[str, Any], words: Words, place: str) -> Resumption |
     require(("resume" in table) == ("resume_from" in table), f"{place}: resume and resume_from go together")
     if "resume" not in table:
         return None
-    source = fill(table["resume_from"], words, place)
-    return Resumption(
-        command=_command(table["resume"], {**words, "resume_from": source}, place), source=Path(source)
-    )
-
-
-def _command(text: str, words: Words, place: str) -> str:
-    return " ".join(fill(text, words, place).split())
-
-
-def fill(text: str, words: Words, place: str) -> str:
-    """Put words in the place of their names in braces; a word may hold further names.
-
-    Args:
-        text: Text with names in braces.
-        words: Words by name.
-        place: Where the text stands, for messages.
-
-    Raises:
-        ConfigurationError: A name is unknown, or words name each other without end.
-    """
-
-    def word(match: re.Match[str]) -> str:
-        require(
-            match[1] in words,
-            f"{place}: {{{match[1]}}} is not known; allowed: {', '.join(sorted(words))}",
-        )
-        return words[match[1]]
-
-    for _ in range(_DEEPEST_NESTING):
-        if not _WORD.search(text):
-            return text
-        text = _WORD.sub(word, text)
-    raise ConfigurationError(f"{place}: settings name each other without end: {text}")
+    source = fill_path(table["resume_from"], words, place)
+    words = {**words, "resume_from": str(source)}
+    return Resumption(command=fill_command(table["resume"], words, place), source=source)
 
 
 def _with_needs(stages: Sequence[Stage], path: Path) -> list[Stage]:

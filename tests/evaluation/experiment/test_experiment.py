@@ -111,8 +111,52 @@ def test_stages_are_chosen_by_pattern(experiment):
 
 @pytest.mark.parametrize(
     ("entry", "message"),
-    [("command = 3", "command=3 .* no text"), ('command = "true"\neach = 4', "each=4 .* no list")],
+    [
+        ("command = 3", "command=3 is no text"),
+        ('command = "true"\neach = 4', "each=4 is no list"),
+        ('command = "true"\neach = [1]', "entry of a stage's each=1 is no table"),
+        ('command = "true"\neach = []', r"each=\[\] makes no stage 'a'"),
+        ('command = "true"\nneeds = [1]', "entry of a stage's needs=1 is no text"),
+        ('command = "true"\nmakes = ""', "the path '' is empty"),
+        ('command = "true"\nappears_whole = "false"', "appears_whole='false' is no truth value"),
+    ],
 )
 def test_entries_of_another_type_are_named(experiment, entry, message):
     with pytest.raises(ConfigurationError, match=message):
         experiment(f'[[stage]]\nname = "a"\n{entry}\n')
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("settings = 3", "settings=3 is no table"),
+        ("environment = 3", "environment=3 is no table"),
+        ("stage = 3", "stage=3 is no list"),
+        ("stage = [3]", "stage=3 is no table"),
+    ],
+)
+def test_tables_of_another_type_are_named(tmp_path, content, message):
+    path = tmp_path / "stages.toml"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError, match=message):
+        read_experiment(path)
+
+
+def test_variables_of_bash_are_left_to_it(experiment):
+    text = '[[stage]]\nname = "a"\ncommand = "echo ${HOME} ${{tmp}}"'
+    assert experiment(text, tmp="TMPDIR").stages[0].command == "echo ${HOME} ${TMPDIR}"
+
+
+MADE = '[[stage]]\nname = "a"\nmakes = "{tmp}/a"\ncommand = "mkdir {makes}"'
+
+
+def test_a_path_with_white_space_is_refused(experiment):
+    with pytest.raises(ConfigurationError, match="a: the path 'my out/a' has white space"):
+        experiment(MADE, tmp="my out")
+
+
+def test_a_comment_within_a_command_is_refused(experiment):
+    text = '[[stage]]\nname = "a"\ncommand = """\nmkdir x\n# make it\n&& false"""'
+    with pytest.raises(ConfigurationError, match="a: bash would take what follows ' #' for a comment"):
+        experiment(text)
+    assert experiment(text.replace("# make it", "--name=a#1")).stages
