@@ -75,7 +75,7 @@ def test_options_that_cannot_be_used_are_named(file, capsys, option, message):
 def test_a_closed_terminal_ends_the_stages(tmp_path):
     path = tmp_path / "stages.toml"
     path.write_text(
-        f'[[stage]]\nname = "long"\nmakes = "{tmp_path}/long"\ncommand = "touch {tmp_path}/begun; sleep 60"'
+        f'[[stage]]\nname = "long"\nmakes = "{tmp_path}/long"\ncommand = "sleep 1; touch {tmp_path}/begun; sleep 60"'
     )
     code = "from lerobot_excav.scripts.main import main; raise SystemExit(main())"
     runner = subprocess.Popen([sys.executable, "-c", code, "experiment", str(path)])
