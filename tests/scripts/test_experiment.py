@@ -77,7 +77,9 @@ def test_a_closed_terminal_ends_the_stages(tmp_path):
     path.write_text(
         f'[[stage]]\nname = "long"\nmakes = "{tmp_path}/long"\ncommand = "sleep 1; touch {tmp_path}/begun; sleep 60"'
     )
-    code = "from lerobot_excav.scripts.main import main; raise SystemExit(main())"
+    # A test run in the background may ignore the signal, and what ignores it passes that on.
+    heed = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL)"
+    code = f"{heed}; from lerobot_excav.scripts.main import main; raise SystemExit(main())"
     runner = subprocess.Popen([sys.executable, "-c", code, "experiment", str(path)])
     while not (tmp_path / "begun").exists():
         time.sleep(0.05)

@@ -187,6 +187,15 @@ def test_a_stage_without_result_runs_every_time_and_shows_its_output(experiment,
     assert state(table, table.stages[0]) == "always"
 
 
+@pytest.fixture
+def heeding_interruptions():
+    """Heed Ctrl-C, which a test run in the background ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeding_interruptions")
 def test_an_interruption_ends_the_command_and_leaves_no_result(experiment, tmp_path):
     running = experiment(counted(command="mkdir {makes} && echo $$ > {tmp}/pid && sleep 60"))
 
