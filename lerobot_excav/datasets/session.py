@@ -8,21 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.environment import EnvironmentDescription
 from lerobot_excav.datasets.environments import environment_named
 from lerobot_excav.datasets.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.pair import Pair
 from lerobot_excav.envs.settings import (
+    ENDLESS_FRAMES,
     LAST_SCENE,
-    SCENE_SETS,
     TARGETS_PER_SCENE,
-    require_fps,
-    require_image_size,
     require_integer,
     require_task,
+    require_view_settings,
 )
 from lerobot_excav.errors import DatasetError, require, require_choice
-
-_ENDLESS_FRAMES = 2**31 - 1  # the recorder, not the environment, ended the episode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +62,7 @@ class SessionEpisode:
         """Scene and target."""
         return Pair(self.env, self.scene_set, self.scene_id, self.target_id)
 
-    def settings(self, *, episode_length: int = _ENDLESS_FRAMES) -> DemonstrationSettings:
+    def settings(self, *, episode_length: int = ENDLESS_FRAMES) -> DemonstrationSettings:
         """Return the settings of an environment that behaves as the robot did.
 
         Args:
@@ -107,7 +105,7 @@ def _episode(line: Line) -> SessionEpisode:
     environment = environment_named(f"{line.place}: env", record["env"])
     known, unmarked = environment.settings, environment.unmarked_version
     if unmarked is not None and record.setdefault("simulation_version", unmarked) == unmarked:
-        record = {name: known[name].unmarked for name in ("fidelity",)} | record
+        record.setdefault("fidelity", known["fidelity"].unmarked)
     required = ({field.name for field in fields(SessionEpisode)} - {"frames", "restarts", "extra"}) | set(
         known
     )
@@ -116,7 +114,7 @@ def _episode(line: Line) -> SessionEpisode:
         raise DatasetError(
             f"{line.place}: lacks {', '.join(sorted(missing))}; is it a session log of a simulated robot?"
         )
-    _check_values(record, line.place)
+    _check_values(record, environment, line.place)
     return SessionEpisode(
         **{name: record[name] for name in required - set(known)},
         extra={name: record[name] for name in known},
@@ -125,17 +123,14 @@ def _episode(line: Line) -> SessionEpisode:
     )
 
 
-def _check_values(record: dict[str, Any], place: str) -> None:
-    environment = environment_named(f"{place}: env", record["env"])
+def _check_values(record: dict[str, Any], environment: EnvironmentDescription, place: str) -> None:
+    view = ("scene_set", "fps", "observation_height", "observation_width")
+    require_view_settings(f"{place}: ", **{name: record[name] for name in view})
     require_integer(f"{place}: simulation_version", record["simulation_version"], 1)
     require_integer(f"{place}: episode_index", record["episode_index"], 0)
     require_task(f"{place}: task", record["task"], environment.tasks)
-    require_choice(f"{place}: scene_set", record["scene_set"], SCENE_SETS)
     require_integer(f"{place}: scene_id", record["scene_id"], 0, LAST_SCENE)
     require_integer(f"{place}: target_id", record["target_id"], 0, TARGETS_PER_SCENE - 1)
-    require_fps(f"{place}: fps", record["fps"])
-    for name in ("observation_height", "observation_width"):
-        require_image_size(f"{place}: {name}", record[name])
     for name, setting in environment.settings.items():
         require_choice(f"{place}: {name}", record[name], setting.choices)
     if record.get("frames") is not None:

@@ -12,16 +12,12 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
 from lerobot_excav.envs.settings import (
-    MASK_CONDITIONS,
     RENDER_MODES,
-    SCENE_SETS,
     require_episode_length,
-    require_fps,
-    require_image_size,
     require_integer,
-    require_mask_noise,
-    require_noise_effect,
+    require_mask_settings,
     require_task,
+    require_view_settings,
 )
 from lerobot_excav.errors import require, require_choice
 
@@ -74,13 +70,19 @@ class SimulationEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
             ConfigurationError: A field has a value that the environment cannot use.
         """
         require_task("env.task", self.task, self.TASKS)
-        require_fps("env.fps", self.fps)
-        require_image_size("env.observation_height", self.observation_height)
-        require_image_size("env.observation_width", self.observation_width)
-        require_choice("env.scene_set", self.scene_set, SCENE_SETS)
-        require_choice("env.mask_condition", self.mask_condition, MASK_CONDITIONS)
-        require_mask_noise("env.", self.mask_noise, self.mask_noise_px)
-        require_noise_effect("env.", self.mask_condition, self.mask_noise)
+        require_view_settings(
+            "env.",
+            scene_set=self.scene_set,
+            fps=self.fps,
+            observation_height=self.observation_height,
+            observation_width=self.observation_width,
+        )
+        require_mask_settings(
+            "env.",
+            mask_condition=self.mask_condition,
+            mask_noise=self.mask_noise,
+            mask_noise_px=self.mask_noise_px,
+        )
         require_episode_length("env.episode_length", self.episode_length)
         require_choice("env.render_mode", self.render_mode, RENDER_MODES)
         if self.metrics_episodes is not None:

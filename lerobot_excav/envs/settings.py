@@ -20,44 +20,60 @@ FIDELITIES = ("fast", "standard", "fine")
 TARGETS_PER_SCENE = 4
 LAST_SCENE = 2**31 - 1  # of every scene set; datasets hold a scene's number as int64
 TICKS_PER_SECOND = 50
+ENDLESS_FRAMES = 2**31 - 1  # length of an episode that the command, not the environment, ends
 EXCAVATOR_EPISODE_DURATION_S = 20.0  # time limit of an episode unless another is asked for (kind: paper)
 FR5_EPISODE_DURATION_S = 8.0  # that of the arm (kind: paper, 400 frames at 50 Hz)
 RENDER_MODES = ("rgb_array", None)
 IMAGE_SIZE_LIMITS = (32, 1024)  # [px]; below, a target covers hardly a pixel
 
 
-def require_mask_noise(prefix: str, noise: str, size_px: int) -> None:
-    """Raise unless kind and size of the mask's noise belong together.
+def require_mask_settings(prefix: str, *, mask_condition: str, mask_noise: str, mask_noise_px: int) -> None:
+    """Raise unless condition, kind and size of the mask's noise belong together.
 
     Args:
         prefix: What the user writes before the name of a field, such as `env.`.
-        noise: Kind of the noise.
-        size_px: Its size [px].
+        mask_condition: What the mask shows.
+        mask_noise: Kind of the noise.
+        mask_noise_px: Its size [px].
 
     Raises:
-        ConfigurationError: The kind is unknown, the size is no whole number from 0 on, or one has no effect without the
-            other.
+        ConfigurationError: Condition or kind is unknown, the size is no whole number from 0 on, or one has no effect
+            with the others.
     """
-    require_choice(f"{prefix}mask_noise", noise, MASK_NOISES)
-    require_integer(f"{prefix}mask_noise_px", size_px, 0, IMAGE_SIZE_LIMITS[1])
+    require_choice(f"{prefix}mask_condition", mask_condition, MASK_CONDITIONS)
+    require_choice(f"{prefix}mask_noise", mask_noise, MASK_NOISES)
+    require_integer(f"{prefix}mask_noise_px", mask_noise_px, 0, IMAGE_SIZE_LIMITS[1])
     require(
-        (noise == "none") == (size_px == 0),
-        f"{prefix}mask_noise={noise!r} and {prefix}mask_noise_px={size_px} do not belong together; "
+        (mask_noise == "none") == (mask_noise_px == 0),
+        f"{prefix}mask_noise={mask_noise!r} and {prefix}mask_noise_px={mask_noise_px} do not belong together; "
         "give a kind of noise and a size from 1 pixel on, or neither (none, 0)",
     )
-
-
-def require_noise_effect(prefix: str, condition: str, noise: str) -> None:
-    """Raise if noise is asked for on a mask that shows nothing.
-
-    Raises:
-        ConfigurationError: The mask's condition is `zero`, and there is noise.
-    """
     require(
-        condition != "zero" or noise == "none",
-        f"{prefix}mask_noise={noise!r} has no effect with {prefix}mask_condition='zero', which shows no mask; "
+        mask_condition != "zero" or mask_noise == "none",
+        f"{prefix}mask_noise={mask_noise!r} has no effect with {prefix}mask_condition='zero', which shows no mask; "
         "leave one of them out",
     )
+
+
+def require_view_settings(
+    prefix: str, *, scene_set: str, fps: int, observation_height: int, observation_width: int
+) -> None:
+    """Raise unless scenes, frame rate and pictures are those of a simulation.
+
+    Args:
+        prefix: What the user writes before the name of a field, such as `env.`.
+        scene_set: Stream of scenes.
+        fps: Frames per second.
+        observation_height: Height of every picture [px].
+        observation_width: Width of every picture [px].
+
+    Raises:
+        ConfigurationError: One of them is not possible.
+    """
+    require_choice(f"{prefix}scene_set", scene_set, SCENE_SETS)
+    require_fps(f"{prefix}fps", fps)
+    require_image_size(f"{prefix}observation_height", observation_height)
+    require_image_size(f"{prefix}observation_width", observation_width)
 
 
 def require_retarget_frame(field: str, frame: int | None, episode_length: int) -> None:

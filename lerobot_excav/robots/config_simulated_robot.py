@@ -7,11 +7,9 @@ from lerobot.robots import RobotConfig
 
 from lerobot_excav.envs.settings import (
     LAST_SCENE,
-    SCENE_SETS,
     TARGETS_PER_SCENE,
-    require_fps,
-    require_image_size,
     require_integer,
+    require_view_settings,
 )
 from lerobot_excav.errors import require_choice
 
@@ -54,10 +52,13 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
             ConfigurationError: A field has a value that the simulation cannot use.
         """
         super().__post_init__()
-        require_fps("robot.fps", self.fps)
-        for name in ("observation_height", "observation_width"):
-            require_image_size(f"robot.{name}", getattr(self, name))
-        require_choice("robot.scene_set", self.scene_set, SCENE_SETS)
+        require_view_settings(
+            "robot.",
+            scene_set=self.scene_set,
+            fps=self.fps,
+            observation_height=self.observation_height,
+            observation_width=self.observation_width,
+        )
         require_integer("robot.scene_id", self.scene_id, 0, LAST_SCENE)
         require_choice("robot.target_id", self.target_id, range(TARGETS_PER_SCENE))
         require_choice("robot.advance", self.advance, ADVANCE_MODES)

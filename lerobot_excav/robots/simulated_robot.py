@@ -30,9 +30,6 @@ from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_press
 
 logger = logging.getLogger(__name__)
 
-ENDLESS = 2**31 - 1
-"""Frames of an episode; LeRobot's commands, not the environment, end it."""
-
 
 class SimulatedEnvironment(Protocol):
     """What a robot needs of the environment behind it."""

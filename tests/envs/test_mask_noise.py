@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.mask_noise import noisy_mask
-from lerobot_excav.envs.settings import require_mask_noise
+from lerobot_excav.envs.settings import require_mask_settings
 from lerobot_excav.errors import ConfigurationError
 
 HEIGHT, WIDTH = 40, 60
@@ -98,4 +98,4 @@ def test_results_are_black_and_white_in_three_equal_channels(noise):
 )
 def test_kind_and_size_must_belong_together(noise, size_px, named):
     with pytest.raises(ConfigurationError, match=named):
-        require_mask_noise("env.", noise, size_px)
+        require_mask_settings("env.", mask_condition="correct", mask_noise=noise, mask_noise_px=size_px)

@@ -22,18 +22,14 @@ from lerobot_excav.envs.settings import (
     EXCAVATOR_EPISODE_DURATION_S,
     EXCAVATOR_TASKS,
     FIDELITIES,
-    MASK_CONDITIONS,
     RENDER_MODES,
-    SCENE_SETS,
     SOILS,
     TARGETS_PER_SCENE,
     TICKS_PER_SECOND,
     require_episode_length,
-    require_fps,
-    require_image_size,
-    require_mask_noise,
-    require_noise_effect,
+    require_mask_settings,
     require_task,
+    require_view_settings,
 )
 from lerobot_excav.errors import ConfigurationError, require_choice
 
@@ -111,16 +107,22 @@ class ExcavatorEnv(gym.Env[dict[str, Any], NDArray[Any]]):
     ) -> None:
         require_task("task", task, EXCAVATOR_TASKS)
         require_choice("obs_type", obs_type, OBS_TYPES)
-        require_choice("scene_set", scene_set, SCENE_SETS)
-        require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
-        require_mask_noise("", mask_noise, mask_noise_px)
-        require_noise_effect("", mask_condition, mask_noise)
+        require_view_settings(
+            "",
+            scene_set=scene_set,
+            fps=fps,
+            observation_height=observation_height,
+            observation_width=observation_width,
+        )
+        require_mask_settings(
+            "",
+            mask_condition=mask_condition,
+            mask_noise=mask_noise,
+            mask_noise_px=mask_noise_px,
+        )
         require_choice("soil", soil, SOILS)
         require_choice("fidelity", fidelity, FIDELITIES)
         require_choice("render_mode", render_mode, RENDER_MODES)
-        require_fps("fps", fps)
-        require_image_size("observation_height", observation_height)
-        require_image_size("observation_width", observation_width)
         require_episode_length("episode_length", episode_length)
         self.task, self.task_description = task, TASK_DESCRIPTION
         self.scene_set, self.mask_condition = scene_set, mask_condition

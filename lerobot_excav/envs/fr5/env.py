@@ -20,16 +20,14 @@ from lerobot_excav.envs.selection import select_scene_and_target
 from lerobot_excav.envs.settings import (
     FR5_EPISODE_DURATION_S,
     FR5_TASKS,
-    MASK_CONDITIONS,
     RENDER_MODES,
     SCENE_SETS,
     TICKS_PER_SECOND,
     require_episode_length,
-    require_fps,
-    require_image_size,
-    require_mask_noise,
-    require_noise_effect,
+    require_mask_settings,
     require_retarget_frame,
+    require_task,
+    require_view_settings,
 )
 from lerobot_excav.errors import ConfigurationError, require_choice
 
@@ -98,16 +96,22 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         episode_length: int | None = None,
         render_mode: str | None = "rgb_array",
     ) -> None:
-        require_choice("task", task, FR5_TASKS)
+        require_task("task", task, FR5_TASKS)
         require_choice("obs_type", obs_type, OBS_TYPES)
-        require_choice("scene_set", scene_set, SCENE_SETS)
-        require_choice("mask_condition", mask_condition, MASK_CONDITIONS)
-        require_mask_noise("", mask_noise, mask_noise_px)
-        require_noise_effect("", mask_condition, mask_noise)
+        require_view_settings(
+            "",
+            scene_set=scene_set,
+            fps=fps,
+            observation_height=observation_height,
+            observation_width=observation_width,
+        )
+        require_mask_settings(
+            "",
+            mask_condition=mask_condition,
+            mask_noise=mask_noise,
+            mask_noise_px=mask_noise_px,
+        )
         require_choice("render_mode", render_mode, RENDER_MODES)
-        require_fps("fps", fps)
-        require_image_size("observation_height", observation_height)
-        require_image_size("observation_width", observation_width)
         require_episode_length("episode_length", episode_length)
         self.fps = fps
         self.episode_length = (
@@ -116,8 +120,7 @@ class FR5GraspEnv(gym.Env[dict[str, Any], NDArray[Any]]):
         require_retarget_frame("retarget_frame", retarget_frame, self.episode_length)
         self.task, self.task_description = task, TASK_DESCRIPTION
         self.scene_set, self.mask_condition = scene_set, mask_condition
-        self.mask_noise, self.mask_noise_px = mask_noise, mask_noise_px
-        self.retarget_frame = retarget_frame
+        self.mask_noise, self.mask_noise_px, self.retarget_frame = mask_noise, mask_noise_px, retarget_frame
         self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
         self.obs_type, self.render_mode = obs_type, render_mode
         self.metadata = {**type(self).metadata, "render_fps": fps}

@@ -1,5 +1,7 @@
 """The work cell in motion: arm, gripper and blocks under joint position targets."""
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -144,20 +146,25 @@ class Workcell:
     def fingers_touching(self) -> NDArray[np.bool_]:
         """Return which finger's pad touches which block, (2, 4): wide and narrow finger, blocks."""
         touching = np.zeros((len(self._pads), layout.BLOCK_COUNT), dtype=bool)
-        for pair in self.data.contact.geom[: self.data.ncon]:
-            for pad, block in (pair, pair[::-1]):
-                if pad in self._pads and block in self._block_geoms:
-                    touching[self._pads[pad], self._block_geoms[block]] = True
+        for part, block in self._block_contacts():
+            if part in self._pads:
+                touching[self._pads[part], block] = True
         return touching
 
     def arm_touching(self) -> NDArray[np.bool_]:
         """Return which blocks any part of arm or gripper touches, (4,)."""
         touching = np.zeros(layout.BLOCK_COUNT, dtype=bool)
+        for part, block in self._block_contacts():
+            if self.model.geom_group[part] == ARM.group:
+                touching[block] = True
+        return touching
+
+    def _block_contacts(self) -> Iterator[tuple[int, int]]:
+        """Yield every contact of a block: the geom that touches it, and the block's index."""
         for pair in self.data.contact.geom[: self.data.ncon]:
             for part, block in (pair, pair[::-1]):
-                if block in self._block_geoms and self.model.geom_group[part] == ARM.group:
-                    touching[self._block_geoms[block]] = True
-        return touching
+                if block in self._block_geoms:
+                    yield part, self._block_geoms[block]
 
     def _lead_to(self, target: NDArray[np.float64]) -> None:
         """Move the servos' reference towards a target, within what the speed limits allow."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.settings import FIDELITIES, SOILS, TARGETS_PER_SCENE
+from lerobot_excav.envs.settings import ENDLESS_FRAMES, FIDELITIES, SOILS, TARGETS_PER_SCENE
 from lerobot_excav.errors import DatasetError, ExcavError
 from lerobot_excav.evaluation.fuzz.actions import STYLES, Action
 from lerobot_excav.evaluation.fuzz.soundness import SoundnessCheck, reset_problem
@@ -17,7 +17,6 @@ _SCENES = 8
 """Scenes are few, since drawing one takes as long as many steps."""
 
 _SHARE_WITH_RESET = 0.5
-_ENDLESS = 2**31 - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +180,7 @@ def _step(env: ExcavatorEnv, check: SoundnessCheck, action: Action) -> str:
 
 def _environment(soil: str, fidelity: str) -> ExcavatorEnv:
     return ExcavatorEnv(
-        soil=soil, fidelity=fidelity, obs_type="agent_pos", render_mode=None, episode_length=_ENDLESS
+        soil=soil, fidelity=fidelity, obs_type="agent_pos", render_mode=None, episode_length=ENDLESS_FRAMES
     )
 
 

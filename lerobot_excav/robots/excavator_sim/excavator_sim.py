@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
-from lerobot_excav.robots.simulated_robot import ENDLESS, SimulatedRobot
+from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
 
 class ExcavatorSim(SimulatedRobot[ExcavatorEnv]):
@@ -43,7 +44,7 @@ class ExcavatorSim(SimulatedRobot[ExcavatorEnv]):
             observation_width=self.config.observation_width,
             scene_set=self.config.scene_set,
             fps=self.config.fps,
-            episode_length=ENDLESS,
+            episode_length=ENDLESS_FRAMES,
             soil=self.config.soil,
             fidelity=self.config.fidelity,
         )

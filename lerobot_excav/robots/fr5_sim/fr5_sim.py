@@ -6,8 +6,9 @@ from lerobot_excav.envs.fr5.env import FR5GraspEnv
 from lerobot_excav.envs.fr5.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION
 from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW
+from lerobot_excav.envs.settings import ENDLESS_FRAMES
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
-from lerobot_excav.robots.simulated_robot import ENDLESS, SimulatedRobot
+from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
 
 class FR5Sim(SimulatedRobot[FR5GraspEnv]):
@@ -35,7 +36,7 @@ class FR5Sim(SimulatedRobot[FR5GraspEnv]):
             observation_width=self.config.observation_width,
             scene_set=self.config.scene_set,
             fps=self.config.fps,
-            episode_length=ENDLESS,
+            episode_length=ENDLESS_FRAMES,
         )
 
     @override
