@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
-from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
-from lerobot_excav.envs.excavator.targets import target_mask_img
+from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.targets import target_mask_img
 
 TINT_RGB = np.array([235, 60, 40])
 

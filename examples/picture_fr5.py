@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lerobot_excav.envs.fr5.env import FR5GraspEnv
-from lerobot_excav.envs.fr5.operator import ScriptedOperator
-from lerobot_excav.envs.fr5.rendering import WorkcellRenderer
+from lerobot_excav.envs.machines.fr5.rendering import WorkcellRenderer
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
+from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
 
 TINT_RGB = np.array([0, 235, 235])
 LIFTED = 2.0  # reward of a lifted block

@@ -15,8 +15,8 @@ Importing a configuration registers it. LeRobot finds the class that belongs to 
 so no simulator is loaded here.
 """
 
-from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
-from lerobot_excav.envs.configuration_fr5_grasp import FR5GraspEnvConfig
+from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
+from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig

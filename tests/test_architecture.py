@@ -10,7 +10,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # Each part may import itself, what stands before it in its row, and errors.
 LAYERS = [
-    ["envs.soil", "envs", "robots", "teleoperators", "datasets", "evaluation", "scripts"],
+    ["envs.soil", "envs.machines", "envs.masks", "envs.tasks", "envs", "robots", "teleoperators", "datasets", "evaluation", "scripts"],
     ["policies"],
 ]
 # The list of what is registered names everything; the benchmark and the export use the policies from outside.

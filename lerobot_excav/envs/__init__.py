@@ -3,8 +3,8 @@
 import gymnasium as gym
 
 GYM_IDS = {
-    "Scoop-v0": "lerobot_excav.envs.excavator.env:ExcavatorEnv",
-    "FR5Grasp-v0": "lerobot_excav.envs.fr5.env:FR5GraspEnv",
+    "Scoop-v0": "lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
+    "FR5Grasp-v0": "lerobot_excav.envs.tasks.grasp.env:FR5GraspEnv",
 }
 """Tasks by name, and the class that plays each."""
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import override
 
-from lerobot_excav.envs.fr5.layout import NO_BLOCK
+from lerobot_excav.envs.machines.fr5.layout import NO_BLOCK
 from lerobot_excav.evaluation.episode import Episode
 from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, get_args
 
-from lerobot_excav.datasets.json_lines import Line, read_json_lines
+from lerobot_excav.datasets.format.json_lines import Line, read_json_lines
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.episode import Episode, EpisodeKey
 from lerobot_excav.evaluation.grasp_table import GRASP

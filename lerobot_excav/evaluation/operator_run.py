@@ -4,13 +4,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.pair import Pair
-from lerobot_excav.datasets.progress import EpisodeProgress
-from lerobot_excav.datasets.rig import Rig
-from lerobot_excav.datasets.simulation import play_demonstration
-from lerobot_excav.datasets.workers import episode_result, submit_episode, worker_pool
-from lerobot_excav.envs.metrics_log import json_line
+from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.progress import EpisodeProgress
+from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.datasets.record.simulation import play_demonstration
+from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.envs.configs.metrics_log import json_line
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from lerobot_excav.envs.excavator.simulation_version import UNMARKED_VERSION
+from lerobot_excav.envs.tasks.scoop.simulation_version import UNMARKED_VERSION
 from lerobot_excav.evaluation.episode import Episode
 from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
 

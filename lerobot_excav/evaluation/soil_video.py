@@ -8,10 +8,10 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
-from lerobot_excav.envs.excavator.rendering import WorksiteRenderer
-from lerobot_excav.envs.settings import TICKS_PER_SECOND
+from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.settings import TICKS_PER_SECOND
 
 FRAMES_PER_SECOND = 20
 """With one tick to a picture, 2.5 times slower than real time."""

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.rig import ExcavatorRig
-from lerobot_excav.datasets.simulation import play_demonstration
-from lerobot_excav.envs.settings import FIDELITIES
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.rig import ExcavatorRig
+from lerobot_excav.datasets.record.simulation import play_demonstration
+from lerobot_excav.envs.tasks.settings import FIDELITIES
 
 _SOIL_NUMBERS = (
     ("", "real_time_factor", "x real time"),
@@ -80,7 +80,7 @@ def measure_environment(*, quick: bool) -> list[Measurement]:
 
 def measure_demonstrations(*, quick: bool, workers: int) -> list[Measurement]:
     """Measure recording, from nothing to a finished dataset."""
-    from lerobot_excav.datasets.demonstrations import record_demonstrations
+    from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 
     settings = DemonstrationSettings(scenes=1 if quick else 3, keep_failures=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -95,8 +95,8 @@ def measure_demonstrations(*, quick: bool, workers: int) -> list[Measurement]:
 
 def measure_writing(*, quick: bool) -> list[Measurement]:
     """Measure storing and assembling alone: frames through the episode store and LeRobot's writer."""
-    from lerobot_excav.datasets.assembly import append_episode, create_dataset
-    from lerobot_excav.datasets.episode_store import EpisodeStore
+    from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
+    from lerobot_excav.datasets.record.episode_store import EpisodeStore
 
     settings = DemonstrationSettings(scenes=1, episode_length=40 if quick else 120, keep_failures=True)
     pair = settings.pairs()[0]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import (
+from lerobot_excav.envs.tasks.settings import (
     LAST_SCENE,
     TARGETS_PER_SCENE,
     require_integer,

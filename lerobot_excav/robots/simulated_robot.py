@@ -20,7 +20,7 @@ import numpy as np
 from lerobot.robots import Robot
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.settings import TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig

@@ -28,7 +28,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lerobot_excav.envs.settings import FIDELITIES, SOILS
+from lerobot_excav.envs.tasks.settings import FIDELITIES, SOILS
 from lerobot_excav.errors import ConfigurationError, require
 
 if TYPE_CHECKING:

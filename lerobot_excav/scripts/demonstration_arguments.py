@@ -3,11 +3,11 @@
 import argparse
 from typing import Any
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.environments import ENVIRONMENTS
-from lerobot_excav.datasets.storage import STORAGES
-from lerobot_excav.datasets.target_rule import TARGET_RULES
-from lerobot_excav.envs.settings import FIDELITIES, SCENE_SETS, SOILS, TARGETS_PER_SCENE
+from lerobot_excav.datasets.format.storage import STORAGES
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
+from lerobot_excav.datasets.record.target_rule import TARGET_RULES
+from lerobot_excav.envs.tasks.settings import FIDELITIES, SCENE_SETS, SOILS, TARGETS_PER_SCENE
 
 DEFAULT_WORKERS = 2
 

@@ -18,7 +18,7 @@ Examples:
 import argparse
 from pathlib import Path
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.scripts.demonstration_arguments import add_settings, add_storage, settings_from
 
 
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record, and say what was recorded."""
     # Slow to import (LeRobot, PyTorch), so after the arguments are known to be right.
-    from lerobot_excav.datasets.demonstrations import DemonstrationSummary, record_demonstrations
+    from lerobot_excav.datasets.record.demonstrations import DemonstrationSummary, record_demonstrations
 
     settings = settings_from(arguments)
     summary: DemonstrationSummary = record_demonstrations(

@@ -20,11 +20,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.datasets.environments import ENVIRONMENTS
-from lerobot_excav.datasets.pair_coverage import START_SETTINGS, PairCoverage, pair_coverage
-from lerobot_excav.datasets.selection import COMPOSITIONS, select, usable
-from lerobot_excav.datasets.split import SPLIT_UNITS, Split, split
-from lerobot_excav.datasets.version_check import episodes_by_version, require_one_version, versions_of
+from lerobot_excav.datasets.check.version_check import episodes_by_version, require_one_version, versions_of
+from lerobot_excav.datasets.pairs.pair_coverage import START_SETTINGS, PairCoverage, pair_coverage
+from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
+from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 from lerobot_excav.errors import require
 
 DEFAULT_EVAL_FRACTION = 0.2
@@ -59,12 +59,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Complete, rebuild, choose, and say what came of it."""
-    from lerobot_excav.datasets.paired_index import INDEX_PATH, write_index
+    from lerobot_excav.datasets.pairs.paired_index import INDEX_PATH, write_index
 
     _require_options_with_effect(arguments)
     root = arguments.dataset
     if arguments.session is not None:
-        from lerobot_excav.datasets.resimulation import complete_recording
+        from lerobot_excav.datasets.complete.resimulation import complete_recording
 
         root = complete_recording(
             root, arguments.session, out=arguments.out, skip_restarted=arguments.skip_restarted
@@ -136,7 +136,7 @@ def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame)
         fraction = DEFAULT_EVAL_FRACTION if arguments.eval_fraction is None else arguments.eval_fraction
         parts = split(rows, arguments.split, eval_fraction=fraction, seed=seed)
     if parts.evaluation:
-        from lerobot_excav.datasets.episode_table import require_single_task
+        from lerobot_excav.datasets.format.episode_table import require_single_task
 
         require_single_task(root, [*parts.train, *parts.evaluation])
     if arguments.flags:

@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check, and print the verdicts."""
-    from lerobot_excav.datasets.paired_index import FAILED
-    from lerobot_excav.datasets.quality_check import check_dataset
+    from lerobot_excav.datasets.check.quality_check import check_dataset
+    from lerobot_excav.datasets.pairs.paired_index import FAILED
 
     rows = check_dataset(
         arguments.dataset,

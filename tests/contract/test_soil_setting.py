@@ -10,11 +10,11 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.configuration_excavator import ExcavatorEnvConfig
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
-from lerobot_excav.envs.settings import SOILS
+from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.settings import SOILS
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 from lerobot_excav.scripts.main import main

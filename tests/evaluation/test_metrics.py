@@ -1,6 +1,6 @@
 import pytest
 
-from lerobot_excav.envs.metrics_log import MetricsLog
+from lerobot_excav.envs.configs.metrics_log import MetricsLog
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.episode import EpisodeKey
 from lerobot_excav.evaluation.metrics import read_evaluation

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.environments import ENVIRONMENTS
-from lerobot_excav.datasets.excavator_environment import EXCAVATOR
-from lerobot_excav.datasets.rig import ExcavatorRig
-from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
+from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
+from lerobot_excav.datasets.record.rig import ExcavatorRig
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.operator_run import evaluate_operator

@@ -1,6 +1,6 @@
 import pytest
 
-from lerobot_excav.envs.excavator.worksite import Worksite
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.scripts.main import main
 
 

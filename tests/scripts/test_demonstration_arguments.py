@@ -2,7 +2,7 @@ import argparse
 
 import pytest
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts import bench, demos
 from lerobot_excav.scripts.demonstration_arguments import settings_from

@@ -66,7 +66,7 @@ def test_the_summary_says_what_was_left_out(env, whole, capsys):
 
 
 def test_recorded_frames_have_the_environments_pictures(env, whole):
-    from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
+    from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 
     item = LeRobotDataset("local/whole", root=whole, video_backend="pyav")[0]
     settings = DemonstrationSettings.of(env, height=32, width=32)

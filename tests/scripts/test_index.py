@@ -2,7 +2,7 @@ import shlex
 
 import pytest
 
-from lerobot_excav.datasets.paired_index import build_index
+from lerobot_excav.datasets.pairs.paired_index import build_index
 from lerobot_excav.scripts.main import main
 
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
-from lerobot_excav.envs.excavator.operator.path import UnreachableError
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator.path import UnreachableError
 
 Action = NDArray[np.float32]
 Style = Callable[[ExcavatorEnv, np.random.Generator], Iterator[Action]]

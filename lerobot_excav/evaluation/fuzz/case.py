@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.settings import ENDLESS_FRAMES, FIDELITIES, SOILS, TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES, FIDELITIES, SOILS, TARGETS_PER_SCENE
 from lerobot_excav.errors import DatasetError, ExcavError
 from lerobot_excav.evaluation.fuzz.actions import STYLES, Action
 from lerobot_excav.evaluation.fuzz.soundness import SoundnessCheck, reset_problem

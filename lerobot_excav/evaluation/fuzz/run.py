@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from lerobot_excav.datasets.workers import worker_pool
+from lerobot_excav.datasets.record.workers import worker_pool
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.fuzz.case import Failure, FuzzCase, play
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
 from lerobot_excav.envs.soil import Reaction, Soil
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 
 LEDGER_TOLERANCE_KG = 1e-6
 FARTHEST_M = 20.0

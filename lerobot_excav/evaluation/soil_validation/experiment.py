@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from lerobot_excav.envs.settings import FIDELITIES, SOILS
+from lerobot_excav.envs.tasks.settings import FIDELITIES, SOILS
 from lerobot_excav.errors import require, require_choice
 from lerobot_excav.evaluation.soil_validation.results import Check, Result
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from lerobot_excav.datasets.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.rig import ExcavatorRig
-from lerobot_excav.datasets.simulation import play_demonstration
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.rig import ExcavatorRig
+from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
 from lerobot_excav.evaluation.soil_validation.results import Check, Result, Table
 from lerobot_excav.evaluation.soil_validation.tracking import track

@@ -5,7 +5,7 @@ import os
 import platform
 from pathlib import Path
 
-from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
 from lerobot_excav.evaluation.soil_validation.plots import draw
 from lerobot_excav.evaluation.soil_validation.results import Check, Result, Table, number_text

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.constants import TICK_S
-from lerobot_excav.envs.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
-from lerobot_excav.envs.excavator.machine import ExcavatorMachine
+from lerobot_excav.envs.machines.excavator.constants import TICK_S
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment
 from lerobot_excav.evaluation.soil_validation.results import Check, Curve, Plot, Result, Table

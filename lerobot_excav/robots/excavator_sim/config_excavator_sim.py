@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.settings import EXCAVATOR_TASKS, FIDELITIES, SOILS, require_task
+from lerobot_excav.envs.tasks.settings import EXCAVATOR_TASKS, FIDELITIES, SOILS, require_task
 from lerobot_excav.errors import require_choice
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 

@@ -6,10 +6,10 @@ from typing import Any, override
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
-from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
-from lerobot_excav.envs.settings import ENDLESS_FRAMES
+from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.simulated_robot import SimulatedRobot

@@ -2,11 +2,11 @@
 
 from typing import Any, override
 
-from lerobot_excav.envs.fr5.env import FR5GraspEnv
-from lerobot_excav.envs.fr5.features import ACTION_NAMES, CAMERAS, STATE_NAMES
-from lerobot_excav.envs.fr5.simulation_version import SIMULATION_VERSION
-from lerobot_excav.envs.fr5.workcell import ACTION_HIGH, ACTION_LOW
-from lerobot_excav.envs.settings import ENDLESS_FRAMES
+from lerobot_excav.envs.machines.fr5.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.machines.fr5.workcell import ACTION_HIGH, ACTION_LOW
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
+from lerobot_excav.envs.tasks.grasp.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import override
 
-from lerobot_excav.envs.excavator.features import ACTION_NAMES
+from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig

@@ -5,9 +5,9 @@ from typing import override
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.features import ACTION_NAMES
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
 from lerobot_excav.teleoperators.scripted_teleoperator import ScriptedTeleoperator
 

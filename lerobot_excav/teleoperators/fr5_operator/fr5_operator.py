@@ -4,8 +4,8 @@ from typing import override
 
 import numpy as np
 
-from lerobot_excav.envs.fr5.features import ACTION_NAMES
-from lerobot_excav.envs.fr5.operator import ScriptedOperator
+from lerobot_excav.envs.machines.fr5.features import ACTION_NAMES
+from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
 from lerobot_excav.teleoperators.scripted_teleoperator import ScriptedTeleoperator
 

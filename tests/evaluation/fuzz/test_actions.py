@@ -3,9 +3,9 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
-from lerobot_excav.envs.excavator.operator.path import UnreachableError
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator.path import UnreachableError
 from lerobot_excav.evaluation.fuzz.actions import STYLES
 
 

@@ -2,8 +2,8 @@ from itertools import product
 
 import pytest
 
-from lerobot_excav.envs.excavator.worksite import Worksite
-from lerobot_excav.envs.settings import FIDELITIES, SOILS
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.settings import FIDELITIES, SOILS
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.fuzz.actions import STYLES
 from lerobot_excav.evaluation.fuzz.case import Episode, Failure, FuzzCase, play, replay

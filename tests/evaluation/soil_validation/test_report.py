@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from lerobot_excav.envs.excavator.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.soil_validation.catalogue import EXPERIMENTS, chosen
 from lerobot_excav.evaluation.soil_validation.experiment import Conditions, Experiment

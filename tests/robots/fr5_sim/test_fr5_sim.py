@@ -11,8 +11,8 @@ import pytest
 from lerobot.rollout.robot_wrapper import ThreadSafeRobot
 from lerobot.rollout.strategies.core import RolloutStrategy
 
-from lerobot_excav.envs.fr5.constants import JOINT_LIMITS_RAD
-from lerobot_excav.envs.fr5.env import FR5GraspEnv
+from lerobot_excav.envs.machines.fr5.constants import JOINT_LIMITS_RAD
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.fr5_sim.fr5_sim import FR5Sim
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lerobot_excav.envs.excavator.env import ExcavatorEnv
-from lerobot_excav.envs.excavator.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig

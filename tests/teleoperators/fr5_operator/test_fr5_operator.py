@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lerobot_excav.envs.fr5.env import FR5GraspEnv
-from lerobot_excav.envs.fr5.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
+from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.fr5_sim.fr5_sim import FR5Sim
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig

@@ -1,0 +1,1 @@
+"""Completing what lerobot-record recorded, by playing it again."""

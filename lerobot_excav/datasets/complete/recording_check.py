@@ -1,0 +1,114 @@
+"""Whether a recording of `lerobot-record` can be completed from its session."""
+
+import functools
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from lerobot_excav.datasets.check.version_check import require_this_simulation
+from lerobot_excav.datasets.complete.session import SessionEpisode
+from lerobot_excav.datasets.format.episode_table import iterate_episodes, read_info
+from lerobot_excav.datasets.format.schema import MASK_KEY, excav_features, require_columns
+from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.errors import DatasetError
+
+MASK_OVERLAP = 0.8
+"""Least intersection over union of recorded and drawn mask; another graphics card may draw its border differently, but
+the patches of two targets lie apart (guess)."""
+
+
+def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
+    """Check that a recording lacks the `excav.*` columns only, and was made as its session says, in this simulation.
+
+    Raises:
+        DatasetError: It is not so.
+    """
+    info = read_info(root)
+    environment = info.environment
+    added = excav_features(environment)
+    present = [key for key in added if key in info.features]
+    if present:
+        raise DatasetError(
+            f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
+        )
+    require_columns(environment, info.features | added)
+    missing = [index for index in range(info.total_episodes) if index not in session]
+    if missing:
+        raise DatasetError(
+            f"the session has no line for episodes {missing}; is it the session of this recording?"
+        )
+    versions = {index: session[index].simulation_version for index in range(info.total_episodes)}
+    require_this_simulation(environment, versions, source=root, instead="")
+    for index in range(info.total_episodes):
+        episode = session[index]
+        if episode.env != environment.name:
+            raise DatasetError(
+                f"episode {index}: the session is of {episode.env}, the recording of {environment.name}; "
+                "is it the session of this recording?"
+            )
+        if episode.fps != info.fps:
+            raise DatasetError(
+                f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {info.fps}; "
+                "record with --robot.fps equal to --dataset.fps"
+            )
+
+
+def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_restarted: bool) -> list[int]:
+    """Return the episodes of a recording in which the scene was not restarted.
+
+    Args:
+        session: The session by episode index.
+        total: Number of episodes of the recording.
+        skip_restarted: Whether others may be left out.
+
+    Raises:
+        DatasetError: There are others that may not be left out, or nothing else.
+    """
+    whole = [index for index in range(total) if not session[index].restarts]
+    if len(whole) < total and not (skip_restarted and whole):
+        restarts = {index: session[index].restarts for index in range(total) if session[index].restarts}
+        places = "; ".join(f"episode {index} at frame {list(frames)}" for index, frames in restarts.items())
+        raise DatasetError(
+            f"the scene was restarted within {places}, which is no single demonstration; leave such episodes out "
+            "with --skip-restarted, if others remain, or record again (lerobot-record re-records an episode with the "
+            "left arrow key, or r)"
+        )
+    return whole
+
+
+def require_recorded_targets(root: Path, session: dict[int, SessionEpisode], rig: Rig) -> None:
+    """Check that every episode has the length and the mask that its line of the session announces.
+
+    Raises:
+        DatasetError: One has not.
+    """
+    hint = "was the dataset edited after recording? Index first, edit afterwards"
+    with ExitStack() as stack:
+        # All episodes of a session share their settings, and a graphics context is slow to open.
+        environment = functools.cache(
+            lambda settings: stack.enter_context(closing(rig.environment(settings)))
+        )
+        for recorded in iterate_episodes(root, (MASK_KEY,)):
+            episode = session[recorded.index]
+            if episode.frames not in (None, recorded.length):
+                raise DatasetError(
+                    f"episode {recorded.index} has {recorded.length} frames, but the session noted "
+                    f"{episode.frames} for {episode.pair.uid}; {hint}"
+                )
+            options = {"scene_id": episode.scene_id, "target_id": episode.target_id}
+            observation, _ = environment(episode.settings()).reset(options=options)
+            if not _same_mask(recorded.image(MASK_KEY, 0), observation["pixels"]["target_mask"]):
+                raise DatasetError(
+                    f"episode {recorded.index} does not show the target mask of {episode.pair.uid}, "
+                    f"which the session names; {hint}"
+                )
+
+
+def _same_mask(recorded_img: NDArray[Any], drawn_img: NDArray[Any]) -> bool:
+    """Compare two masks (H, W, 3), binarised at mid-grey."""
+    if recorded_img.shape != drawn_img.shape:
+        return False
+    recorded, drawn = recorded_img[..., 0] > 127, drawn_img[..., 0] > 127
+    return bool((recorded & drawn).sum() >= MASK_OVERLAP * max((recorded | drawn).sum(), 1))

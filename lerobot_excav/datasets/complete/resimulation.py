@@ -1,0 +1,173 @@
+"""Completing a recording of `lerobot-record` with the columns that only the simulation knows.
+
+The recorder stores pictures, state and action. The actions are played again from the scene that the session log names;
+if the recorded states come out, so do the task state and the outcome of the original. All targets of a scene start from
+the same state, so states cannot tell them apart: the target is known by its mask.
+"""
+
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
+from numpy.typing import NDArray
+
+from lerobot_excav.datasets.complete.recording_check import (
+    require_completable,
+    require_recorded_targets,
+    whole_episodes,
+)
+from lerobot_excav.datasets.complete.session import SessionEpisode, read_session
+from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
+from lerobot_excav.datasets.format.schema import (
+    ACTION_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    SIMULATION_KEY,
+    STATE_KEY,
+    SUCCESS_KEY,
+    TARGET_KEY,
+    TASK_STATE_KEY,
+    excav_features,
+    setting_key,
+)
+from lerobot_excav.datasets.pairs.paired_index import write_index
+from lerobot_excav.datasets.record.episode import Episode, replay
+from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.errors import DatasetError
+
+STATE_TOLERANCE = 1e-4
+"""Allowed deviation of a state [rad, rad/s]; the same build repeats exactly, another processor may round (guess)."""
+
+
+def complete_recording(
+    root: Path,
+    session_path: Path,
+    *,
+    out: Path | None = None,
+    skip_restarted: bool = False,
+    rig: Rig | None = None,
+) -> Path:
+    """Add the `excav.*` columns to a recording, and its index.
+
+    Args:
+        root: The recorded dataset. It stays as it is until everything has succeeded.
+        session_path: Session log of the simulated robot.
+        out: Where to put the completed dataset; it replaces `root` by default.
+        skip_restarted: Whether to leave out episodes in which the scene was restarted, instead of refusing them.
+        rig: Makes the environment; that of the recording by default.
+
+    Returns:
+        Folder of the completed dataset.
+
+    Raises:
+        DatasetError: Columns exist already, the session does not fit, or the re-simulation deviates from the recording.
+    """
+    if out is not None and out.exists():
+        raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+    session = read_session(session_path)
+    require_completable(root, session)
+    environment = read_info(root).environment
+    whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
+    # Beside the destination, so that the last step is a rename.
+    temporary = (out or root).with_name(f".{root.name}.{uuid.uuid4().hex[:8]}")
+    try:
+        with _reduced(root, whole, temporary.with_name(f"{temporary.name}.whole")) as reduced:
+            # Leaving episodes out renumbers the others.
+            renumbered = {number: session[index] for number, index in enumerate(whole)}
+            require_recorded_targets(reduced, renumbered, rig or environment.rig())
+            episodes = _resimulate_all(reduced, renumbered, rig or environment.rig(with_images=False))
+            _write_completed(reduced, episodes, renumbered, temporary)
+        write_index(temporary)
+        return _put_in_place(temporary, root, out)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+@contextmanager
+def _reduced(root: Path, episodes: list[int], copy: Path) -> Iterator[Path]:
+    """Provide a dataset with these episodes only, by LeRobot's own tool: `root` if it has no others, else a copy."""
+    others = sorted(set(range(read_info(root).total_episodes)) - set(episodes))
+    if not others:
+        yield root
+        return
+    try:
+        dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
+        delete_episodes(dataset, others, output_dir=copy, repo_id=dataset.repo_id)
+        yield copy
+    finally:
+        shutil.rmtree(copy, ignore_errors=True)
+
+
+def _resimulate_all(root: Path, session: dict[int, SessionEpisode], rig: Rig) -> dict[int, Episode]:
+    return {
+        recorded.index: _resimulate(rig, recorded, session[recorded.index])
+        for recorded in iterate_episodes(root, (STATE_KEY, ACTION_KEY))
+    }
+
+
+def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Episode:
+    limit = recorded.environment.replay_length(recorded.length)
+    env = rig.environment(session.settings(episode_length=limit))
+    try:
+        played = replay(env, recorded.action, session.pair)
+    finally:
+        env.close()
+    deviation = np.abs(played.state - recorded.state).max(axis=1)
+    if deviation.max() > STATE_TOLERANCE:
+        frame = int(np.argmax(deviation > STATE_TOLERANCE))
+        raise DatasetError(
+            f"episode {recorded.index}: the re-simulation of {session.pair.uid} leaves the recorded state at frame "
+            f"{frame} of {recorded.length} (largest deviation {deviation.max():.3g} rad or rad/s, allowed "
+            f"{STATE_TOLERANCE:g}); is it the session of this recording, and the version that recorded it?"
+        )
+    return played
+
+
+def _write_completed(
+    root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path
+) -> None:
+    """Copy a dataset with the new columns, by LeRobot's own tool."""
+    environment = read_info(root).environment
+    columns = excav_features(environment)
+
+    def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
+        return lambda row, episode, frame: values[int(episode)], columns[key]
+
+    def task_state(row: dict[str, Any], episode: int, frame: int) -> NDArray[Any]:
+        values: NDArray[Any] = episodes[int(episode)].task_state[int(frame)]
+        return values
+
+    features = {
+        SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),
+        TARGET_KEY: constant(TARGET_KEY, {i: e.pair.target_id for i, e in episodes.items()}),
+        PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
+        TASK_STATE_KEY: (task_state, columns[TASK_STATE_KEY]),
+        SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
+        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, environment.simulation_version)),
+        **{
+            setting_key(name): constant(setting_key(name), {i: session[i].extra[name] for i in episodes})
+            for name in environment.settings
+        },
+    }
+    dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
+    add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)
+
+
+def _put_in_place(temporary: Path, root: Path, out: Path | None) -> Path:
+    if out is not None:
+        temporary.rename(out)
+        return out
+    original = temporary.with_name(f"{temporary.name}.original")
+    root.rename(original)
+    try:
+        temporary.rename(root)
+    except OSError:
+        original.rename(root)
+        raise
+    shutil.rmtree(original)
+    return root

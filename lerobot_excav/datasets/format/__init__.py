@@ -1,0 +1,1 @@
+"""What a dataset holds, and reading it back episode by episode."""

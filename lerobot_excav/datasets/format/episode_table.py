@@ -1,0 +1,278 @@
+"""Reading a dataset episode by episode, straight from its files (LeRobot's dataset format v3.0).
+
+LeRobot's own reader first copies all pictures into a cache; what the index and the checks need is a small part of them.
+"""
+
+import json
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.format.pictures import Pictures, StoredImages, VideoSpan
+from lerobot_excav.datasets.format.schema import (
+    ACTION_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    SIMULATION_KEY,
+    STATE_KEY,
+    SUCCESS_KEY,
+    TARGET_KEY,
+    TASK_STATE_KEY,
+    setting_key,
+    unmarked_columns,
+)
+from lerobot_excav.datasets.record.environment import EnvironmentDescription
+from lerobot_excav.datasets.record.environments import environment_of_robot
+from lerobot_excav.errors import DatasetError
+
+CODEBASE_VERSION = "v3.0"
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeTable:
+    """Columns of one episode of a dataset.
+
+    Attributes:
+        index: Episode index.
+        length: Number of frames.
+        environment: Where it comes from.
+        columns: The columns asked for, by key, without pictures.
+        pictures: The pictures asked for, by key, undecoded.
+    """
+
+    index: int
+    length: int
+    environment: EnvironmentDescription
+    columns: dict[str, pa.ChunkedArray]
+    pictures: dict[str, Pictures]
+
+    def array(self, key: str) -> NDArray[Any]:
+        """Return a numeric column, shape (n, k) or (n,)."""
+        return np.stack(self.columns[key].to_numpy())
+
+    @property
+    def state(self) -> NDArray[Any]:
+        """What was felt of the machine, (n, s)."""
+        return self.array(STATE_KEY)
+
+    @property
+    def action(self) -> NDArray[Any]:
+        """What the machine was told, (n, a)."""
+        return self.array(ACTION_KEY)
+
+    @property
+    def task_state(self) -> NDArray[Any]:
+        """Task state, (n, k)."""
+        return self.array(TASK_STATE_KEY)
+
+    @property
+    def success(self) -> bool:
+        """Outcome."""
+        return bool(self._constant(SUCCESS_KEY))
+
+    @property
+    def simulation_version(self) -> int:
+        """Version of the simulation that the episode was recorded in."""
+        return int(self._constant(SIMULATION_KEY))
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """Settings that not every environment has, such as the soil, by name."""
+        return {name: str(self._constant(setting_key(name))) for name in self.environment.settings}
+
+    @property
+    def pair(self) -> Pair:
+        """Scene and target.
+
+        Raises:
+            DatasetError: The columns contradict each other.
+        """
+        pair = Pair.parse(self._constant(PAIR_KEY))
+        ids = (self._constant(SCENE_KEY), self._constant(TARGET_KEY))
+        if pair.env != self.environment.name:
+            raise DatasetError(
+                f"episode {self.index}: {PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's robot_type is "
+                f"that of {self.environment.name!r}"
+            )
+        if ids != (pair.scene_id, pair.target_id):
+            raise DatasetError(
+                f"episode {self.index}: scene and target {ids} contradict {PAIR_KEY}={pair.uid!r}"
+            )
+        return pair
+
+    def first_frame(self) -> "EpisodeTable":
+        """Return a copy that holds the first frame only, so that the rest can be forgotten."""
+        first = {
+            key: pa.chunked_array([pa.array(column[:1].to_pylist(), column.type)])
+            for key, column in self.columns.items()
+        }
+        pictures = {key: pictures.first() for key, pictures in self.pictures.items()}
+        return replace(self, length=1, columns=first, pictures=pictures)
+
+    def image(self, key: str, frame: int) -> NDArray[Any]:
+        """Return a decoded picture, (H, W, 3) uint8."""
+        return self.pictures[key].frame(frame)
+
+    def distinct_images(self, key: str) -> int:
+        """Count different pictures."""
+        return self.pictures[key].distinct()
+
+    def _constant(self, key: str) -> Any:
+        values = pc.unique(self.columns[key]).to_pylist()
+        if len(values) != 1:
+            raise DatasetError(
+                f"episode {self.index}: {key} changes within the episode: {values[:3]}; it names the whole episode"
+            )
+        return values[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetInfo:
+    """What `meta/info.json` says.
+
+    Attributes:
+        fps: Frames per second.
+        total_episodes: Number of episodes.
+        features: Feature descriptions by key.
+        robot_type: Which robot it is of.
+        video_path: Pattern of the paths of its videos; None if it has none.
+    """
+
+    fps: int
+    total_episodes: int
+    features: dict[str, Any]
+    robot_type: str | None
+    video_path: str | None
+
+    @property
+    def environment(self) -> EnvironmentDescription:
+        """The environment that the dataset comes from.
+
+        Raises:
+            DatasetError: It comes from elsewhere.
+        """
+        return environment_of_robot(self.robot_type)
+
+
+def read_info(root: Path) -> DatasetInfo:
+    """Read what a dataset on disk says about itself.
+
+    Raises:
+        DatasetError: There is no dataset, or it has another format.
+    """
+    try:
+        info = json.loads((root / "meta" / "info.json").read_text())
+    except FileNotFoundError:
+        raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json") from None
+    if info["codebase_version"] != CODEBASE_VERSION:
+        raise DatasetError(
+            f"{root} has the format {info['codebase_version']}; this needs {CODEBASE_VERSION}, so convert it"
+        )
+    return DatasetInfo(
+        fps=info["fps"],
+        total_episodes=info["total_episodes"],
+        features=info["features"],
+        robot_type=info["robot_type"],
+        video_path=info.get("video_path"),
+    )
+
+
+def iterate_episodes(
+    root: Path, keys: Sequence[str], *, episodes: Collection[int] | None = None
+) -> Iterator[EpisodeTable]:
+    """Go through a dataset's episodes in the order of their files.
+
+    Args:
+        root: The dataset.
+        keys: Columns to read. Those of `schema.unmarked_columns` that a dataset lacks are filled in.
+        episodes: Episode indices; all by default.
+
+    Yields:
+        One table per episode, frames in order.
+    """
+    info = read_info(root)
+    wanted = set(range(info.total_episodes) if episodes is None else episodes)
+    stored = {kind: [key for key in keys if _dtype(info, key) == kind] for kind in ("image", "video")}
+    spans = _video_spans(root, info, stored["video"])
+    columns = [key for key in keys if key not in stored["video"]]
+    for path in sorted(root.glob("data/*/*.parquet")):
+        for index, rows in _episodes_of_file(path, columns, wanted, info.environment):
+            yield EpisodeTable(
+                index=index,
+                length=rows.num_rows,
+                environment=info.environment,
+                columns={key: rows[key] for key in columns if key not in stored["image"]},
+                pictures={
+                    **{key: StoredImages(rows[key]) for key in stored["image"]},
+                    **spans.get(index, {}),
+                },
+            )
+
+
+def _dtype(info: DatasetInfo, key: str) -> str:
+    return str(info.features.get(key, {}).get("dtype", ""))
+
+
+def _video_spans(root: Path, info: DatasetInfo, keys: Sequence[str]) -> dict[int, dict[str, VideoSpan]]:
+    """Find where the videos of every episode lie."""
+    if not keys or info.video_path is None:
+        return {}
+    parts = ("chunk_index", "file_index", "from_timestamp")
+    columns = ["episode_index", "length", *(f"videos/{key}/{part}" for key in keys for part in parts)]
+    spans: dict[int, dict[str, VideoSpan]] = {}
+    for path in sorted(root.glob("meta/episodes/*/*.parquet")):
+        for row in pq.read_table(path, columns=columns).to_pylist():
+            for key in keys:
+                chunk, file, start_s = (row[f"videos/{key}/{part}"] for part in parts)
+                place = info.video_path.format(video_key=key, chunk_index=chunk, file_index=file)
+                span = VideoSpan(path=root / place, start_s=start_s, fps=info.fps, length=row["length"])
+                spans.setdefault(row["episode_index"], {})[key] = span
+    return spans
+
+
+def _episodes_of_file(
+    path: Path, keys: Sequence[str], wanted: set[int], environment: EnvironmentDescription
+) -> Iterator[tuple[int, pa.Table]]:
+    parquet = pq.ParquetFile(path)
+    columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
+    for group in range(parquet.num_row_groups):
+        # LeRobot writes one row group per episode; a file written by something else just costs more memory.
+        table = _marked(parquet.read_row_group(group, columns=columns), columns, environment)
+        for index in pc.unique(table["episode_index"]).to_pylist():
+            if index in wanted:
+                rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
+                yield index, rows
+
+
+def _marked(table: pa.Table, columns: Sequence[str], environment: EnvironmentDescription) -> pa.Table:
+    """Fill in columns that were asked for and that the first version of the simulation did not write."""
+    for key, value in unmarked_columns(environment).items():
+        if key in columns and key not in table.column_names:
+            table = table.append_column(key, pa.array([value] * table.num_rows))
+    return table
+
+
+def require_single_task(root: Path, episodes: Collection[int]) -> None:
+    """Check that `lerobot-train` can hold out exactly the episodes it is told to; it splits task by task.
+
+    Raises:
+        DatasetError: The episodes have several task descriptions.
+    """
+    tasks = {
+        index
+        for table in iterate_episodes(root, ["task_index"], episodes=episodes)
+        for index in table.array("task_index")
+    }
+    if len(tasks) > 1:
+        raise DatasetError(
+            f"the chosen episodes have {len(tasks)} task descriptions, and lerobot-train splits each of them apart; "
+            "give them one with `lerobot-edit-dataset --operation.type=modify_tasks`, or train without --split"
+        )

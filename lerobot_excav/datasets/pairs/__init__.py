@@ -1,0 +1,1 @@
+"""The paired-scene index, and what is chosen and held out by it."""

@@ -1,0 +1,133 @@
+"""The paired-scene index: one row per episode, `meta/excav_pairs.parquet`.
+
+The index is derived from the per-frame columns and can be rebuilt at any time; edits with LeRobot's tools drop it or
+leave it stale. Only the verdicts of the quality check are remembered in it: they follow an episode by the fingerprint
+of its state and action traces, not by its number.
+"""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
+from lerobot_excav.datasets.format.schema import (
+    ACTION_KEY,
+    MASK_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    SIMULATION_KEY,
+    STATE_KEY,
+    SUCCESS_KEY,
+    TARGET_KEY,
+    TASK_STATE_KEY,
+    require_columns,
+    setting_key,
+)
+from lerobot_excav.datasets.record.environment import EnvironmentDescription
+
+INDEX_PATH = Path("meta/excav_pairs.parquet")
+
+UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
+
+
+def index_keys(environment: EnvironmentDescription) -> list[str]:
+    """Return the columns of a dataset that its index is derived from."""
+    return [
+        STATE_KEY,
+        ACTION_KEY,
+        MASK_KEY,
+        SCENE_KEY,
+        TARGET_KEY,
+        PAIR_KEY,
+        TASK_STATE_KEY,
+        SUCCESS_KEY,
+        SIMULATION_KEY,
+        *(setting_key(name) for name in environment.settings),
+    ]
+
+
+def build_index(root: Path) -> pd.DataFrame:
+    """Derive the index of a dataset from its columns.
+
+    Args:
+        root: The dataset.
+
+    Returns:
+        One row per episode, ordered by `episode_index`; columns as in `docs/datasets.md`. Verdicts are taken over from
+        the stored index, if there is one, for episodes whose traces are unchanged.
+
+    Raises:
+        DatasetError: A column is missing, or contradicts another.
+    """
+    info = read_info(root)
+    require_columns(info.environment, info.features)
+    rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.environment))]
+    index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
+    return _with_verdicts(index, _stored(root))
+
+
+def write_index(root: Path) -> pd.DataFrame:
+    """Rebuild the stored index of a dataset and return it."""
+    index = build_index(root)
+    store_index(root, index)
+    return index
+
+
+def store_index(root: Path, index: pd.DataFrame) -> None:
+    """Write an index beside its dataset; readers see the old one or the new one, never half of one."""
+    path = root / INDEX_PATH
+    temporary = path.with_suffix(".tmp")
+    index.to_parquet(temporary, index=False)
+    temporary.replace(path)
+
+
+def _row(episode: EpisodeTable) -> dict[str, Any]:
+    pair = episode.pair
+    return {
+        "pair_uid": pair.uid,
+        "episode_index": episode.index,
+        **pair._asdict(),
+        "simulation_version": episode.simulation_version,
+        **episode.settings,
+        "length": episode.length,
+        "success": episode.success,
+        **_mask_summary(episode.image(MASK_KEY, 0)),
+        **episode.environment.outcome(episode.task_state),
+        "fingerprint": fingerprint(episode),
+    }
+
+
+def _mask_summary(mask_img: NDArray[Any]) -> dict[str, float]:
+    """Return area and centroid of a mask (H, W, 3); the centroid of an empty mask is NaN."""
+    rows, columns = np.nonzero(mask_img[..., 0] > 127)
+    empty = rows.size == 0
+    return {
+        "mask_area_px": rows.size,
+        "mask_centroid_row_px": float("nan") if empty else float(rows.mean()),
+        "mask_centroid_column_px": float("nan") if empty else float(columns.mean()),
+    }
+
+
+def fingerprint(episode: EpisodeTable) -> str:
+    """Return a digest of what was seen of the joints and commanded, which an edit of the dataset does not change."""
+    digest = hashlib.sha256(episode.columns[PAIR_KEY][0].as_py().encode())
+    for trace in (episode.state, episode.action):
+        digest.update(np.ascontiguousarray(trace, dtype=np.float32).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _stored(root: Path) -> pd.DataFrame | None:
+    path = root / INDEX_PATH
+    return pd.read_parquet(path) if path.is_file() else None
+
+
+def _with_verdicts(index: pd.DataFrame, stored: pd.DataFrame | None) -> pd.DataFrame:
+    if stored is None:
+        return index.assign(qc=UNCHECKED, qc_problem="")
+    known = stored.drop_duplicates("fingerprint").set_index("fingerprint")[["qc", "qc_problem"]]
+    merged = index.join(known, on="fingerprint")
+    return merged.fillna({"qc": UNCHECKED, "qc_problem": ""})

@@ -1,0 +1,1 @@
+"""Recording demonstrations with the scripted operator."""

@@ -1,0 +1,147 @@
+"""Recording scripted demonstrations: simulate in parallel, assemble in order, publish at once.
+
+While it is being made, a dataset `OUT` is a folder `OUT.partial` with the settings, the finished episodes and the
+LeRobot dataset that grows from them. The finished dataset is renamed to `OUT`, so `OUT` is complete or absent. Episodes
+are assembled in the order of the settings, so neither the number of workers nor an interruption leaves a trace.
+"""
+
+import shutil
+import time
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.pairs.paired_index import write_index
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.episode_store import EpisodeStore
+from lerobot_excav.datasets.record.partial_run import PartialRun
+from lerobot_excav.datasets.record.progress import EpisodeProgress
+from lerobot_excav.datasets.record.provenance import read_provenance, write_provenance
+from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.datasets.record.simulation import simulate_episode
+from lerobot_excav.datasets.record.workers import episode_result, require_workers, submit_episode, worker_pool
+from lerobot_excav.errors import DatasetError
+
+Outcome = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemonstrationSummary:
+    """What a run has made.
+
+    Attributes:
+        out: The dataset.
+        episodes: Episodes in the dataset.
+        failures: `pair_uid` of every episode without success.
+        simulated_s: Simulated time of all episodes, kept or not [s].
+        wall_s: Time that this call took [s].
+    """
+
+    out: Path
+    episodes: int
+    failures: list[str]
+    simulated_s: float
+    wall_s: float
+
+
+def record_demonstrations(
+    settings: DemonstrationSettings,
+    out: Path,
+    *,
+    workers: int = 2,
+    resume: bool = False,
+    rig: Rig | None = None,
+    show_progress: bool = True,
+) -> DemonstrationSummary:
+    """Record scripted demonstrations as a LeRobot dataset.
+
+    Args:
+        settings: What to record.
+        out: Folder of the dataset.
+        workers: Worker processes; 0 works in this process.
+        resume: Whether to continue an interrupted run.
+        rig: Environment and operator; those of the settings by default.
+        show_progress: Whether to draw a progress bar.
+
+    Returns:
+        Counts, failures and times.
+
+    Raises:
+        DatasetError: `out` exists, an interrupted run is in the way, or no episode is worth keeping.
+        ConfigurationError: `workers` is negative, or a started run has other settings.
+    """
+    require_workers(workers)
+    start = time.monotonic()
+    if out.exists():
+        outcomes = _require_finished(out, settings, resume=resume)
+    else:
+        with PartialRun(out, settings, resume=resume) as partial:
+            rig = rig or settings.environment.rig()
+            outcomes = _fill(partial, settings, workers=workers, rig=rig, show_progress=show_progress)
+            partial.dataset.rename(out)
+    PartialRun.remove(out)
+    return DemonstrationSummary(
+        out=out,
+        episodes=sum(outcome["kept"] for outcome in outcomes),
+        failures=[outcome["pair_uid"] for outcome in outcomes if not outcome["success"]],
+        simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.fps,
+        wall_s=time.monotonic() - start,
+    )
+
+
+def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: bool) -> list[Outcome]:
+    if not resume:
+        raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+    provenance = read_provenance(out)
+    settings.require_same(provenance.settings)
+    return provenance.outcomes
+
+
+def _fill(
+    partial: PartialRun, settings: DemonstrationSettings, *, workers: int, rig: Rig, show_progress: bool
+) -> list[Outcome]:
+    """Simulate what is missing and assemble everything in order."""
+    pairs = settings.pairs()
+    with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:
+        futures = {pair: _start(pool, progress, rig, settings, pair, partial.episodes) for pair in pairs}
+        # LeRobot takes seconds to load; by now the workers are at work.
+        from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
+
+        dataset = create_dataset(partial.dataset, settings)
+        outcomes = []
+        for pair, future in futures.items():
+            outcome = episode_result(pair, future)
+            if outcome["kept"]:
+                append_episode(dataset, EpisodeStore(partial.episodes).read(pair), settings)
+            outcomes.append(outcome)
+    if not any(outcome["kept"] for outcome in outcomes):
+        raise DatasetError(
+            f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; "
+            f"to look at them, remove {partial.folder} and record again with --keep-failures "
+            "(the time limit is --episode-length)"
+        )
+    dataset.finalize()
+    shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
+    write_provenance(partial.dataset, settings, outcomes)
+    write_index(partial.dataset)
+    return outcomes
+
+
+def _start(
+    pool: Executor,
+    progress: EpisodeProgress,
+    rig: Rig,
+    settings: DemonstrationSettings,
+    pair: Pair,
+    folder: Path,
+) -> Future[Outcome]:
+    """Submit an episode, unless it is finished already."""
+    finished = EpisodeStore(folder).outcome(pair)
+    if finished is not None:
+        progress.skip()
+        future: Future[Outcome] = Future()
+        future.set_result(finished)
+        return future
+    return submit_episode(pool, progress, simulate_episode, rig, settings, pair, folder)

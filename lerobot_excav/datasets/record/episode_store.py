@@ -1,0 +1,123 @@
+"""Finished episodes on disk, one by one, until a dataset is assembled from them.
+
+An episode is two files: `NAME.npz` with the frames (only if it is kept) and `NAME.json` with its outcome. Both are
+written under another name and renamed, the outcome last, so an outcome on disk means that the episode is complete.
+"""
+
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.record.episode import Episode
+
+# Only a stopover: LeRobot compresses again, so speed counts here (level 1 takes a third of level 6's time).
+PNG_LEVEL = 1
+
+
+class EpisodeStore:
+    """A folder of finished episodes.
+
+    Args:
+        folder: Where they lie; created if missing.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def write(self, episode: Episode, *, keep_frames: bool) -> dict[str, Any]:
+        """Write a finished episode.
+
+        Args:
+            episode: The episode.
+            keep_frames: Whether its frames are wanted, or only its outcome.
+
+        Returns:
+            The outcome that was written: success, frame count, whether frames were kept, and metrics.
+        """
+        outcome = {
+            "pair_uid": episode.pair.uid,
+            "success": episode.success,
+            "frames": episode.length,
+            "kept": keep_frames,
+            "metrics": episode.metrics,
+        }
+        if keep_frames:
+            buffer = io.BytesIO()
+            np.savez(buffer, allow_pickle=False, **_arrays(episode))
+            _replace(self._path(episode.pair, "npz"), buffer.getbuffer())
+        _replace(self._path(episode.pair, "json"), json.dumps(outcome).encode())
+        return outcome
+
+    def outcome(self, pair: Pair) -> dict[str, Any] | None:
+        """Return the outcome of an episode, or None if it is not finished."""
+        try:
+            return dict(json.loads(self._path(pair, "json").read_text()))
+        except FileNotFoundError:
+            return None
+
+    def read(self, pair: Pair) -> Episode:
+        """Read a finished episode whose frames were kept."""
+        outcome = json.loads(self._path(pair, "json").read_text())
+        with np.load(self._path(pair, "npz")) as stored:
+            arrays = {key: stored[key] for key in stored.files}
+        cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
+        return Episode(
+            pair=pair,
+            task=str(arrays["task"]),
+            images={camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras},
+            state=arrays["state"],
+            action=arrays["action"],
+            task_state=arrays["task_state"],
+            success=bool(outcome["success"]),
+            metrics=outcome["metrics"],
+        )
+
+    def _path(self, pair: Pair, suffix: str) -> Path:
+        return self._folder / f"{pair.uid.replace('/', '-')}.{suffix}"
+
+
+def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
+    arrays = {
+        "task": np.array(episode.task),
+        "state": episode.state,
+        "action": episode.action,
+        "task_state": episode.task_state,
+    }
+    for camera, frames in episode.images.items():
+        arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
+    return arrays
+
+
+def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Compress images (n, H, W, 3) into one run of bytes and the end of each within it."""
+    buffer = io.BytesIO()
+    ends = []
+    for frame in frames:
+        Image.fromarray(frame).save(buffer, format="png", compress_level=PNG_LEVEL)
+        ends.append(buffer.tell())
+    return np.frombuffer(buffer.getvalue(), dtype=np.uint8), np.array(ends, dtype=np.int64)
+
+
+def _decode(data: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
+    starts = np.concatenate([[0], ends[:-1]])
+    return np.stack(
+        [np.asarray(Image.open(io.BytesIO(data[a:b].tobytes()))) for a, b in zip(starts, ends, strict=True)]
+    )
+
+
+def _replace(path: Path, data: bytes | memoryview) -> None:
+    """Write a file so that it is either absent or whole, even if the machine stops."""
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    with temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)

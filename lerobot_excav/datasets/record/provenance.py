@@ -1,0 +1,64 @@
+"""How a dataset was made: `meta/excav_demonstrations.json`.
+
+A sidecar that LeRobot's dataset tools drop, as they do with every file they do not know. Nothing depends on it except
+convenience: replays find their soil in it, and failed episodes are listed nowhere else.
+"""
+
+import json
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.errors import DatasetError
+
+PROVENANCE_PATH = Path("meta/excav_demonstrations.json")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Settings and outcomes of a scripted dataset.
+
+    Attributes:
+        settings: What was recorded.
+        outcomes: Of every episode, kept or not: `pair_uid`, `seed`, `success`, `frames`, `kept`, `metrics`.
+    """
+
+    settings: DemonstrationSettings
+    outcomes: list[dict[str, Any]]
+
+
+def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list[dict[str, Any]]) -> None:
+    """Write how a dataset was made."""
+    record = {
+        "package": f"lerobot_env_excav {version('lerobot_env_excav')}",
+        "operator": "scripted",
+        "settings": settings.as_record(),
+        "episodes": [
+            {**outcome, "seed": settings.episode_seed(Pair.parse(outcome["pair_uid"]))}
+            for outcome in outcomes
+        ],
+    }
+    (root / PROVENANCE_PATH).write_text(json.dumps(record, indent=1) + "\n")
+
+
+def read_provenance(root: Path) -> Provenance:
+    """Read how a dataset was made.
+
+    Raises:
+        DatasetError: The dataset does not say.
+        ConfigurationError: It was made in another version of the simulation.
+    """
+    path = root / PROVENANCE_PATH
+    try:
+        record = json.loads(path.read_text())
+    except FileNotFoundError:
+        raise DatasetError(
+            f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"
+        ) from None
+    return Provenance(
+        settings=DemonstrationSettings.from_record(record["settings"], source=path),
+        outcomes=record["episodes"],
+    )

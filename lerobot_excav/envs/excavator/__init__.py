@@ -1,1 +1,0 @@
-"""The excavator: machine, scenes, targets, task and scripted operator."""

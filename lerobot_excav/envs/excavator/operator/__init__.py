@@ -1,5 +1,0 @@
-"""The scripted operator: plans the bucket's path and drives it with joystick commands."""
-
-from lerobot_excav.envs.excavator.operator.operator import PHASES, ScriptedOperator
-
-__all__ = ["PHASES", "ScriptedOperator"]

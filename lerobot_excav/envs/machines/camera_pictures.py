@@ -1,0 +1,160 @@
+"""Pictures that the fixed cameras of a MuJoCo model take off screen: colour, distance, and what each pixel shows."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.offscreen import create_context
+from lerobot_excav.errors import RenderingError, require, require_choice
+
+
+class CameraPictures:
+    """Draws a model without shadows and reflections.
+
+    All pictures share one graphics context, made with the first of them, in the process that asks for it.
+
+    Every method that draws takes the name of a `camera` and drawing `options` (an `MjvOption`), and raises
+    `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics context can be made or the
+    pictures were closed.
+
+    Args:
+        model: The model.
+        data: Its state, drawn as it is when a picture is asked for.
+        cameras: Names of the cameras that may be asked for.
+        height: Image height H [px].
+        width: Image width W [px].
+        max_geoms: Most geoms that are drawn.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        cameras: Sequence[str],
+        height: int,
+        width: int,
+        max_geoms: int,
+    ) -> None:
+        require(height > 0 and width > 0, f"height={height}, width={width} must be positive")
+        self._model, self._data = model, data
+        self._cameras = tuple(cameras)
+        self._height, self._width = height, width
+        self._max_geoms = max_geoms
+        self._context: Any = None
+        self._mjr: Any = None
+        self._scene: Any = None
+        self._closed = False
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a graphics context now."""
+        return self._context is not None
+
+    def colour(self, camera: str, options: Any) -> NDArray[np.uint8]:
+        """Return a colour picture (H, W, 3), uint8."""
+        self._draw(camera, options)
+        return self._read_colour()
+
+    def distance_m(self, camera: str, options: Any) -> NDArray[np.float64]:
+        """Return the distance along the optical axis (H, W) [m]; the far plane where nothing is."""
+        self._draw(camera, options)
+        buffer = np.empty((self._height, self._width), np.float32)
+        mujoco.mjr_readPixels(None, buffer, self._viewport, self._mjr)
+        visual = self._model.vis.map
+        near, far = (d * self._model.stat.extent for d in (visual.znear, visual.zfar))
+        # The buffer holds 1 at the near plane and 0 at the far one, hyperbolic in between.
+        return np.asarray(near * far / (near + buffer[::-1].astype(np.float64) * (far - near)))
+
+    def points_w(self, camera: str, options: Any) -> NDArray[np.float64]:
+        """Return the point behind every pixel (H, W, 3) [m], world frame."""
+        return self._unproject(camera, self.distance_m(camera, options))
+
+    def geoms(self, camera: str, options: Any) -> NDArray[np.int64]:
+        """Return the index in the model of the geom that every pixel shows (H, W); -1 where none is."""
+        self._open()
+        flags = (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR)
+        for flag in flags:
+            self._scene.flags[flag] = True
+        try:
+            self._draw(camera, options)
+            picture = self._read_colour()
+        finally:
+            for flag in flags:
+                self._scene.flags[flag] = False
+        # Colour n + 1 is the n-th drawn object, 0 the background.
+        number = picture @ np.array([1, 1 << 8, 1 << 16]) - 1
+        shown = np.full((self._height, self._width), -1)
+        for drawn in self._scene.geoms[: self._scene.ngeom]:
+            if drawn.objtype == mujoco.mjtObj.mjOBJ_GEOM:
+                shown[number == drawn.segid] = drawn.objid
+        return shown
+
+    def close(self) -> None:
+        """Free the graphics context; no picture can be taken afterwards."""
+        self._closed = True
+        if self._context is not None:
+            self._context.make_current()
+            self._mjr.free()
+            self._context.free()
+            self._context = self._mjr = self._scene = None
+
+    @property
+    def _viewport(self) -> Any:
+        return mujoco.MjrRect(0, 0, self._width, self._height)
+
+    def _open(self) -> None:
+        if self._closed:
+            raise RenderingError("the renderer was closed; make a new one for more pictures")
+        if self._context is not None:
+            return
+        model = self._model
+        model.vis.global_.offwidth, model.vis.global_.offheight = self._width, self._height
+        self._context = create_context(self._width, self._height)
+        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
+        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+        self._scene = mujoco.MjvScene(model, maxgeom=self._max_geoms)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = False
+
+    def _draw(self, camera: str, options: Any) -> None:
+        require_choice("camera", camera, self._cameras)
+        self._open()
+        self._context.make_current()
+        self._camera.fixedcamid = self._model.camera(camera).id
+        mujoco.mjv_updateScene(
+            self._model, self._data, options, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
+        )
+        mujoco.mjr_render(self._viewport, self._scene, self._mjr)
+
+    def _read_colour(self) -> NDArray[np.uint8]:
+        image = np.empty((self._height, self._width, 3), np.uint8)
+        mujoco.mjr_readPixels(image, None, self._viewport, self._mjr)
+        return image[::-1].copy()
+
+    def _unproject(self, camera: str, distance_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the world points (H, W, 3) at given distances along the optical axis."""
+        index = self._model.camera(camera).id
+        focal_px = 0.5 * self._height / np.tan(0.5 * np.radians(self._model.cam_fovy[index]))
+        row, column = np.indices(distance_m.shape)
+        right = (column + 0.5 - 0.5 * self._width) / focal_px
+        up = (0.5 * self._height - row - 0.5) / focal_px
+        rays = np.stack([right, up, -np.ones_like(right)], axis=-1)
+        axes = self._data.cam_xmat[index].reshape(3, 3)
+        return np.asarray(self._data.cam_xpos[index] + (distance_m[..., None] * rays) @ axes.T)
+
+
+def visible_groups(*groups: int) -> Any:
+    """Return drawing options that show some groups of geoms, skins and tendons and nothing else."""
+    options = mujoco.MjvOption()
+    for shown in (options.geomgroup, options.tendongroup, options.skingroup):
+        shown[:] = 0
+        shown[list(groups)] = 1
+    options.sitegroup[:] = 0
+    return options

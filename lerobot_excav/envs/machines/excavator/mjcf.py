@@ -1,0 +1,219 @@
+"""The MuJoCo model of machine, ground and target box, assembled from primitive geoms."""
+
+import mujoco
+import numpy as np
+
+from lerobot_excav.envs.machines.excavator import bodywork, cameras, surfaces
+from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.excavator.bodywork import (
+    COLLISION_GROUP,
+    SURROUNDINGS_BIT,
+    SURROUNDINGS_GROUP,
+    WORKING_BIT,
+)
+from lerobot_excav.envs.machines.excavator.cameras import CameraPose
+from lerobot_excav.envs.machines.excavator.grains import add_grains
+from lerobot_excav.envs.machines.excavator.load_picture import add_load
+from lerobot_excav.envs.soil.container import Container
+
+GROUND_DROP_M = 0.02
+"""The drawn ground lies this far below the real one, so that soil of zero height is not hidden by it."""
+
+_AXIS_UP = (0.0, 0.0, 1.0)
+_AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift
+
+
+def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mujoco.MjSpec:
+    """Assemble the model.
+
+    Args:
+        container: Target box; the world frame is that of the soil.
+        terrain_shape_m: Size of the dig area along x and y [m], centred on the world origin.
+
+    Returns:
+        A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
+        `house`, `boom`, `arm`, `bucket` and `payload`, the site `cutting_edge`, the cameras `main`, `cab`,
+        `overview` and `side`, and the skins `terrain`, `box_soil`, `load` and `grains_…` that draw the soil.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = "excavator"
+    _set_options(spec)
+    bodywork.add_materials(spec)
+    _add_ground(spec)
+    _add_box(spec, container)
+    _add_machine(spec)
+    surfaces.add_terrain(spec, terrain_shape_m)
+    surfaces.add_box_soil(spec, container)
+    add_load(spec)
+    add_grains(spec)
+    return spec
+
+
+def _set_options(spec: mujoco.MjSpec) -> None:
+    spec.compiler.degree = False
+    spec.option.timestep = const.SUBSTEP_S
+    spec.option.gravity = [0.0, 0.0, -const.GRAVITY_M_S2]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # A diverged state must be seen, not silently replaced by the initial one.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    spec.visual.quality.offsamples = 0
+    spec.visual.quality.shadowsize = 0
+    spec.visual.quality.numslices = 14
+    spec.visual.quality.numstacks = 6
+    spec.visual.map.znear = 0.05
+    spec.visual.map.zfar = 12.0
+    spec.stat.extent = 5.0
+    spec.stat.center = [-1.0, 1.0, 0.5]
+    spec.visual.headlight.ambient = [0.34, 0.35, 0.37]
+    spec.visual.headlight.diffuse = [0.10, 0.10, 0.10]
+    spec.visual.headlight.specular = [0.0, 0.0, 0.0]
+
+
+def _add_ground(spec: mujoco.MjSpec) -> None:
+    world = spec.worldbody
+    sky = spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+    sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+    sky.rgb1, sky.rgb2 = [0.45, 0.62, 0.82], [0.80, 0.84, 0.86]
+    sky.width, sky.height = 32, 192
+    world.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 1.0],
+        group=COLLISION_GROUP,
+        contype=SURROUNDINGS_BIT,
+        conaffinity=WORKING_BIT,
+        friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
+    )
+    world.add_geom(
+        name="ground_picture",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[40.0, 40.0, 40.0],
+        pos=[0.0, 0.0, -GROUND_DROP_M],
+        group=SURROUNDINGS_GROUP,
+        contype=0,
+        conaffinity=0,
+        material="ground",
+    )
+    world.add_light(name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False)
+    _add_camera(world, "main", cameras.MAIN)
+    _add_camera(world, "overview", cameras.OVERVIEW)
+
+
+def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
+    """Add the target box: a floor and four walls that stand outside the container's half extent."""
+    half_x, half_y = container.half_extent_m
+    thickness, height = const.BOX_WALL_THICKNESS_M, container.wall_height_m
+    yaw = container.yaw_rad
+    body = spec.worldbody.add_body(
+        name="box",
+        pos=list(container.center_w),
+        quat=[np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)],
+    )
+    outer_x = half_x + thickness
+    panels = {
+        "box_floor": ((0.0, 0.0, -0.005), (half_x, half_y, 0.005)),
+        "box_wall_front": ((half_x + thickness / 2, 0.0, height / 2), (thickness / 2, half_y, height / 2)),
+        "box_wall_back": ((-half_x - thickness / 2, 0.0, height / 2), (thickness / 2, half_y, height / 2)),
+        "box_wall_left": ((0.0, half_y + thickness / 2, height / 2), (outer_x, thickness / 2, height / 2)),
+        "box_wall_right": ((0.0, -half_y - thickness / 2, height / 2), (outer_x, thickness / 2, height / 2)),
+    }
+    for name, (pos, size) in panels.items():
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=list(pos),
+            size=list(size),
+            mass=0.0,  # it stands still
+            group=SURROUNDINGS_GROUP,
+            contype=SURROUNDINGS_BIT,
+            conaffinity=WORKING_BIT,
+            friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
+            material="box_floor" if name == "box_floor" else "box",
+        )
+
+
+def _add_machine(spec: mujoco.MjSpec) -> None:
+    carrier = _add_body(spec.worldbody, "undercarriage", const.MACHINE_POS_W)
+    carrier.mass, carrier.inertia = const.UNDERCARRIAGE_MASS_KG, [1.0, 1.0, 1.0]
+    carrier.explicitinertial = True
+    house = _add_link(
+        spec, carrier, 0, (0.0, 0.0, const.SWING_HEIGHT_M),
+        const.HOUSE_MASS_KG, const.HOUSE_COM_S, const.HOUSE_INERTIA_KGM2,
+    )  # fmt: skip
+    boom = _add_link(
+        spec, house, 1, const.BOOM_PIN_S, const.BOOM_MASS_KG, const.BOOM_COM_M, const.BOOM_INERTIA_KGM2
+    )
+    arm = _add_link(
+        spec, boom, 2, (const.BOOM_LENGTH_M, 0.0, 0.0),
+        const.ARM_MASS_KG, const.ARM_COM_M, const.ARM_INERTIA_KGM2,
+    )  # fmt: skip
+    bucket = _add_link(
+        spec, arm, 3, (const.ARM_LENGTH_M, 0.0, 0.0),
+        const.BUCKET_MASS_KG, const.BUCKET_COM_T, const.BUCKET_INERTIA_KGM2,
+    )  # fmt: skip
+    bucket.add_site(name="cutting_edge", pos=[const.BUCKET_LENGTH_M, 0.0, 0.0], group=5)
+    _add_payload(bucket)
+    _add_camera(house, "cab", cameras.CAB)
+    _add_camera(house, "side", cameras.SIDE)
+    bodywork.dress_undercarriage(carrier)
+    bodywork.dress_house(house)
+    bodywork.dress_boom(boom)
+    bodywork.dress_arm(arm)
+    bodywork.dress_bucket(spec, bucket)
+    bodywork.add_cylinders(spec)
+
+
+_LINK_NAMES = ("house", "boom", "arm", "bucket")
+
+
+def _add_link(
+    spec: mujoco.MjSpec,
+    parent: mujoco.MjsBody,
+    joint: int,
+    pos: tuple[float, float, float],
+    mass_kg: float,
+    com: tuple[float, float, float],
+    inertia_kgm2: tuple[float, float, float],
+) -> mujoco.MjsBody:
+    """Add a body with its joint and its position servo."""
+    body = _add_body(parent, _LINK_NAMES[joint], pos)
+    body.mass, body.ipos, body.inertia = mass_kg, list(com), list(inertia_kgm2)
+    body.explicitinertial = True
+    # The hydraulics carry the links' own weight. The share of each joint counts as actuator torque (actgravcomp)
+    # and stays inside its torque limit, so the machine is not stronger for it; payload and soil are not carried.
+    body.gravcomp = 1.0
+    name, torque = const.JOINT_NAMES[joint], const.JOINT_TORQUE_NM[joint]
+    body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=list(_AXIS_UP if joint == 0 else _AXIS_RIGHT),
+        range=list(const.JOINT_RANGE_RAD[joint]),
+        limited=True,
+        actgravcomp=True,
+        actfrclimited=True,
+        actfrcrange=[-torque, torque],
+    )
+    stiffness, damping = const.SERVO_STIFFNESS_NM_RAD[joint], const.SERVO_DAMPING_NMS_RAD[joint]
+    actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    actuator.set_to_position(kp=stiffness, kv=damping)
+    actuator.forcelimited, actuator.forcerange = True, [-torque, torque]
+    return body
+
+
+def _add_body(parent: mujoco.MjsBody, name: str, pos: tuple[float, float, float]) -> mujoco.MjsBody:
+    return parent.add_body(name=name, pos=list(pos))
+
+
+def _add_payload(bucket: mujoco.MjsBody) -> None:
+    """Add the body that stands for the soil in the bucket; its inertial values are written at run time."""
+    payload = bucket.add_body(name="payload")
+    # The com must differ from the origin here, or the compiler marks the frames as coinciding and later
+    # changes of `body_ipos` are ignored.
+    payload.mass, payload.ipos, payload.inertia = 1.0, list(const.BUCKET_COM_T), [1.0, 1.0, 1.0]
+    payload.explicitinertial = True
+
+
+def _add_camera(body: mujoco.MjsBody, name: str, pose: CameraPose) -> None:
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, cameras.axes(pose).ravel())
+    body.add_camera(name=name, pos=list(pose.position), quat=quat.tolist(), fovy=pose.fovy_deg)

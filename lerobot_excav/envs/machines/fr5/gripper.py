@@ -1,0 +1,97 @@
+"""The two-finger gripper: mirrored slides in place of the adaptive linkage, driven by one motor."""
+
+import mujoco
+
+from lerobot_excav.envs.machines.fr5 import constants as const
+from lerobot_excav.envs.machines.fr5.geoms import ARM, HARD_SOLREF, Kind
+
+_HAND_RGBA = (0.16, 0.17, 0.19, 1.0)
+_PAD_RGBA = (0.05, 0.05, 0.06, 1.0)
+_ROD_LENGTH_M = const.PAD_CENTRE_M - 0.5 * const.PAD_LENGTH_M - const.HAND_LENGTH_M
+
+
+def add_gripper(spec: mujoco.MjSpec, wrist: mujoco.MjsBody) -> None:
+    """Add hand, fingers, the actuator `gripper` and the site `grasp` between the pads.
+
+    Args:
+        spec: Model that grows.
+        wrist: Last link of the arm.
+    """
+    hand = wrist.add_body(name="hand", pos=[0.0, 0.0, const.FLANGE_OFFSET_M], gravcomp=1.0)
+    hand.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        fromto=[0, 0, 0, 0, 0, const.HAND_LENGTH_M],
+        size=[const.HAND_RADIUS_M, 0, 0],
+        mass=const.HAND_MASS_KG,
+        rgba=_HAND_RGBA,
+        **_collision(ARM),
+    )
+    hand.add_site(name="grasp", pos=[0.0, 0.0, const.PAD_CENTRE_M], group=5)
+    for finger, side in enumerate((1.0, -1.0)):
+        _add_finger(hand, finger, side)
+    _couple_fingers(spec)
+    _add_motor(spec)
+
+
+def _add_finger(hand: mujoco.MjsBody, finger: int, side: float) -> None:
+    """Add a finger that slides along +x or -x of the hand; at zero its pad's face lies in the middle."""
+    name = const.FINGER_NAMES[finger]
+    body = hand.add_body(name=name, gravcomp=1.0)
+    body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=[side, 0, 0],
+        range=[0.0, const.FINGER_STROKE_M],
+        armature=0.05,  # [kg], the motor seen through its gear (kind: guess)
+    )
+    x = side * 0.5 * const.PAD_THICKNESS_M
+    half_size = [0.5 * const.PAD_THICKNESS_M, 0.5 * const.PAD_WIDTH_M[finger], 0.5 * const.PAD_LENGTH_M]
+    body.add_geom(
+        name=f"{name}_pad",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[x, 0.0, const.PAD_CENTRE_M],
+        size=half_size,
+        mass=const.FINGER_MASS_KG[finger],
+        rgba=_PAD_RGBA,
+        friction=const.PAD_FRICTION,
+        condim=4,
+        priority=1,  # rubber decides the friction of what it touches
+        solref=HARD_SOLREF,
+        **_collision(ARM),
+    )
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[x, 0.0, const.HAND_LENGTH_M + 0.5 * _ROD_LENGTH_M],
+        size=[half_size[0], half_size[1], 0.5 * _ROD_LENGTH_M],
+        mass=0,
+        rgba=_HAND_RGBA,
+        **_collision(ARM),
+    )
+
+
+def _couple_fingers(spec: mujoco.MjSpec) -> None:
+    wide, narrow = const.FINGER_NAMES
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        name1=narrow,
+        name2=wide,
+        data=[0.0, 1.0, *[0.0] * 10],
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        solref=HARD_SOLREF,
+    )
+
+
+def _add_motor(spec: mujoco.MjSpec) -> None:
+    """Add one motor whose force the two fingers share."""
+    tendon = spec.add_tendon(name="fingers")
+    for name in const.FINGER_NAMES:
+        tendon.wrap_joint(name, 0.5)
+    motor = spec.add_actuator(name="gripper", target="fingers", trntype=mujoco.mjtTrn.mjTRN_TENDON)
+    motor.set_to_position(kp=2 * const.FINGER_STIFFNESS_N_M, kv=2 * const.FINGER_DAMPING_N_S_M)
+    motor.ctrllimited, motor.ctrlrange = True, [0.0, const.FINGER_STROKE_M]
+    force = 2 * const.FINGER_FORCE_N
+    motor.forcelimited, motor.forcerange = True, [-force, force]
+
+
+def _collision(kind: Kind) -> dict[str, int]:
+    return {"contype": kind.type, "conaffinity": kind.affinity, "group": kind.group}

@@ -1,0 +1,1 @@
+"""Commands, and the masks that show them in a picture."""

@@ -1,0 +1,1 @@
+"""What machines are asked to do: one folder per task, and one environment that plays any of them."""

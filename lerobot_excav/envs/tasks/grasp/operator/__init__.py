@@ -1,0 +1,5 @@
+"""The scripted operator of the arm."""
+
+from lerobot_excav.envs.tasks.grasp.operator.operator import ScriptedOperator
+
+__all__ = ["ScriptedOperator"]

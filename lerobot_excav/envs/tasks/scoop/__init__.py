@@ -1,0 +1,1 @@
+"""Scoop-v0: one dig-load-dump cycle of the excavator on a commanded region."""

@@ -1,0 +1,5 @@
+"""The scripted operator: plans the bucket's path and drives it with joystick commands."""
+
+from lerobot_excav.envs.tasks.scoop.operator.operator import PHASES, ScriptedOperator
+
+__all__ = ["PHASES", "ScriptedOperator"]

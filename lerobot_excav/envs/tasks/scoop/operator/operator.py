@@ -1,0 +1,138 @@
+"""The scripted operator: digs any target of any scene through the four joysticks."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
+from lerobot_excav.envs.machines.excavator.kinematics import forward
+from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, DigCycle
+from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, JointMotion, joint_pos_near
+from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_cut, plan_dump, plan_lift
+from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor, Variation, draw_variation
+
+PHASES = ("reach", "cut", "curl", "lift", "carry", "dump", "rest")
+
+# How the hand follows the plan (kind: tuned).
+TRACKING_TIME_S = 0.3
+"""Time in which a deviation from the plan is made up [s]."""
+ARRIVAL_TOLERANCE_RAD = 0.04
+OVERTIME_S = 0.8
+"""How long to wait for the machine after a motion should have ended [s], for instance when the bucket stalls."""
+FULL_KG = 500.0
+"""Payload at which the cut is broken off [kg]."""
+
+
+class OperatedEnvironment(Protocol):
+    """What the operator looks at: the excavator environment, or anything with the same view of the work."""
+
+    fps: int
+
+    @property
+    def worksite(self) -> Worksite:
+        """Machine, soil and box."""
+
+    @property
+    def cycle(self) -> DigCycle:
+        """The running cycle, with its target."""
+
+
+class ScriptedOperator:
+    """Digs the commanded target, issuing only joystick commands.
+
+    It sees the true state of the worksite, plans the path of the bucket in cylinder coordinates around the swing axis
+    and follows it with rate commands. Style and tremor differ from cycle to cycle.
+
+    Args:
+        rng: Source of style and tremor.
+    """
+
+    def __init__(self, *, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._phase = len(PHASES) - 1
+
+    def reset(self, env: OperatedEnvironment) -> None:
+        """Begin the running cycle of an environment with a newly drawn style."""
+        self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
+        self._tremor = Tremor(self._rng, size=self._variation.tremor)
+        self._cut = plan_cut(env.worksite.soil, env.cycle.target, self._variation)
+        self._begin(0, env)
+
+    @property
+    def phase(self) -> str:
+        """What the operator is doing, one of `PHASES`."""
+        return PHASES[self._phase]
+
+    @property
+    def done(self) -> bool:
+        """Whether the cycle is over and the operator rests."""
+        return self.phase == "rest"
+
+    def act(self, env: OperatedEnvironment) -> NDArray[np.float32]:
+        """Return the joystick command for the next frame.
+
+        Args:
+            env: The environment that was given to `reset`.
+
+        Returns:
+            Swing, boom, arm, bucket in [-1, 1], shape (4,), float32.
+        """
+        joint_pos = env.worksite.machine.joint_pos
+        if self._phase_is_over(joint_pos, env):
+            self._begin(self._phase + 1, env)
+        tremor = self._tremor.step(1.0 / env.fps)
+        if self.done or self._time_s < 0.0:
+            self._time_s += 1.0 / env.fps
+            return np.zeros(4, dtype=np.float32)
+        # Aim at the middle of the frame: the command holds until its end.
+        wanted_pos, _ = self._motion.at(self._time_s)
+        _, wanted_vel = self._motion.at(self._time_s + 0.5 / env.fps)
+        self._time_s += 1.0 / env.fps
+        rate = wanted_vel + (wanted_pos - joint_pos) / TRACKING_TIME_S
+        command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
+        return np.asarray(command, dtype=np.float32)
+
+    def _begin(self, phase: int, env: OperatedEnvironment) -> None:
+        """Start a phase from where the machine is, after the style's pause."""
+        self._phase = phase
+        self._time_s = -self._variation.pauses_s[phase]
+        if not self.done:
+            joint_pos = env.worksite.machine.joint_pos
+            self._motion = JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
+
+    def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Plan the present phase's path from a joint position."""
+        present = _bucket_pose(joint_pos)
+        if self.phase == "reach":
+            return list(np.linspace(joint_pos, joint_pos_near(self._cut.above), 24))
+        if self.phase == "cut":
+            return [joint_pos, *(joint_pos_near(pose) for pose in self._cut.cut[1:])]
+        plans = {
+            "curl": lambda: plan_curl(present),
+            "lift": lambda: plan_lift(present),
+            "carry": lambda: plan_carry(present, self._variation),
+            "dump": lambda: plan_dump(present, self._variation),
+        }
+        return [joint_pos, *(joint_pos_near(pose, keep="pin") for pose in plans[self.phase]()[1:])]
+
+    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: OperatedEnvironment) -> bool:
+        if self.done:
+            return False
+        payload_kg = env.worksite.soil.payload_mass_kg
+        if self.phase == "cut" and payload_kg >= FULL_KG:
+            return True
+        if self._time_s < self._motion.duration_s:
+            return False
+        if self.phase == "dump" and payload_kg >= LOADING_ONSET_KG:
+            return self._time_s > self._motion.duration_s + 3.0
+        arrived = bool(np.max(np.abs(self._motion.end - joint_pos)) < ARRIVAL_TOLERANCE_RAD)
+        return arrived or self._time_s > self._motion.duration_s + OVERTIME_S
+
+
+def _bucket_pose(joint_pos: NDArray[np.float64]) -> BucketPose:
+    edge_pos_w, pitch_rad = forward(joint_pos)
+    radius, _, height = cylinder_from_world(edge_pos_w)
+    return BucketPose(radius_m=radius, height_m=height, pitch_rad=pitch_rad, swing_rad=float(joint_pos[0]))

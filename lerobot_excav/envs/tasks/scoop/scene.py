@@ -1,0 +1,123 @@
+"""Scenes: everything that is drawn before the first action, from a scene set and a number."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.excavator.appearance import Appearance, draw_appearance
+from lerobot_excav.envs.machines.excavator.kinematics import inverse
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
+from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.envs.tasks.scoop.pile import draw_pile
+from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets
+from lerobot_excav.envs.tasks.settings import SCENE_SETS, SOILS
+from lerobot_excav.errors import ExcavError, require, require_choice
+
+SOIL_CELL_SIZE_M = 0.05
+
+# Names this family of random streams; changing it changes every scene, so it changes with the scene's definition only.
+_STREAM = 0xE8CA8
+_PILE_TRIES = 50
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One starting situation of the worksite.
+
+    Attributes:
+        scene_set: `train`, `val` or `test`; their random streams are disjoint.
+        scene_id: Number within the set.
+        soil: Name of the soil preset.
+        heights_m: Soil above the floor [m], shape (nx, ny).
+        joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+        appearance: Colours and light.
+        targets: The feasible dig regions, indexed by `target_id`.
+    """
+
+    scene_set: str
+    scene_id: int
+    soil: str
+    heights_m: NDArray[np.float64]
+    joint_pos: NDArray[np.float64]
+    appearance: Appearance
+    targets: tuple[Target, ...]
+
+
+def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the soil's cell centres along x and y [m], shapes (nx,) and (ny,), world frame."""
+    counts = [round(extent / SOIL_CELL_SIZE_M) for extent in DIG_AREA_EXTENT_M]
+    x_w, y_w = (SOIL_CELL_SIZE_M * (np.arange(n, dtype=np.float64) + 0.5 - 0.5 * n) for n in counts)
+    return np.asarray(x_w), np.asarray(y_w)
+
+
+@lru_cache(maxsize=8)
+def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
+    """Draw a scene; the same arguments give the same scene, byte for byte.
+
+    Drawing takes most of a reset, and the targets of a scene are played one after the other: the last scenes are kept.
+    Their arrays are read-only.
+
+    Args:
+        scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
+        scene_id: Any integer from 0.
+        soil: Name of the soil preset, which sets slope and density of the pile.
+
+    Returns:
+        The scene.
+
+    Raises:
+        ConfigurationError: An argument is not one of the allowed values.
+    """
+    require_choice("scene_set", scene_set, SCENE_SETS)
+    require_choice("soil", soil, SOILS)
+    require(scene_id >= 0, f"scene_id={scene_id} is negative; scenes are numbered from 0")
+    # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
+    stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
+    pile_rng, pose_rng, look_rng = (np.random.default_rng(s) for s in stream.spawn(3))
+    heights_m, targets = _draw_pile_with_targets(pile_rng, soil)
+    joint_pos = _draw_joint_pos(pose_rng)
+    for array in (heights_m, joint_pos, *(target.center_w for target in targets)):
+        array.flags.writeable = False
+    return Scene(
+        scene_set=scene_set,
+        scene_id=scene_id,
+        soil=soil,
+        heights_m=heights_m,
+        joint_pos=joint_pos,
+        appearance=draw_appearance(look_rng),
+        targets=targets,
+    )
+
+
+def _draw_pile_with_targets(
+    rng: np.random.Generator, soil: str
+) -> tuple[NDArray[np.float64], tuple[Target, ...]]:
+    """Draw piles until one offers all its targets."""
+    x_w, y_w = cell_centres_w()
+    parameters = PRESETS[soil]
+    for _ in range(_PILE_TRIES):
+        heights_m = draw_pile(
+            rng, x_w=x_w, y_w=y_w, repose_tan=parameters.slope_tan, density_kg_m3=parameters.density_kg_m3
+        )
+        try:
+            return heights_m, find_targets(heights_m, x_w, y_w, rng)
+        except TooFewTargetsError:
+            continue
+    raise ExcavError(
+        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene"
+    )
+
+
+def _draw_joint_pos(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw a pose between pile and box, bucket raised: where the previous cycle would have left the machine."""
+    while True:
+        joint_pos = inverse(
+            radius_m=rng.uniform(4.0, 5.0),
+            height_m=rng.uniform(2.0, 2.6),
+            pitch_rad=rng.uniform(-2.2, -1.4),
+            swing_rad=rng.uniform(0.5, 1.2),
+        )
+        if joint_pos is not None:
+            return joint_pos

@@ -1,0 +1,105 @@
+"""Dig regions: where on a pile a scoop can be commanded, and the image mask that commands it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
+from lerobot_excav.envs.tasks.scoop.feasibility import PATCH_SIZE_M, feasible_centers_w
+from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
+from lerobot_excav.errors import ExcavError
+
+LEAST_DISTANCE_M = 1.0
+"""Between the centres of two targets of a scene, on the ground plane [m] (kind: tuned)."""
+
+_ORDERS = 100
+
+
+class TooFewTargetsError(ExcavError):
+    """A pile has no room for the wanted number of dig regions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """A square patch of the ground plane, turned towards the machine.
+
+    Attributes:
+        center_w: Centre on the soil surface [m], shape (3,), world frame.
+        yaw_rad: Direction from the machine to the patch [rad].
+        size_m: Edge length [m].
+    """
+
+    center_w: NDArray[np.float64]
+    yaw_rad: float
+    size_m: float = PATCH_SIZE_M
+
+    def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points lie above, on or below the patch.
+
+        Args:
+            points_w: Points [m], shape (..., 2) or (..., 3), world frame; NaN is outside.
+
+        Returns:
+            Booleans, shape (...).
+        """
+        offset = points_w[..., :2] - self.center_w[:2]
+        cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        along = offset[..., 0] * cos + offset[..., 1] * sin
+        across = -offset[..., 0] * sin + offset[..., 1] * cos
+        return np.asarray(np.maximum(np.abs(along), np.abs(across)) <= 0.5 * self.size_m)
+
+
+def find_targets(
+    heights_m: NDArray[np.float64],
+    x_w: NDArray[np.float64],
+    y_w: NDArray[np.float64],
+    rng: np.random.Generator,
+    *,
+    count: int = TARGETS_PER_SCENE,
+) -> tuple[Target, ...]:
+    """Pick dig regions that are reachable and in view, hold enough soil and lie apart from each other.
+
+    Args:
+        heights_m: Soil surface above the floor [m], shape (nx, ny).
+        x_w: Cell centres along x [m], shape (nx,).
+        y_w: Cell centres along y [m], shape (ny,).
+        rng: Source of the choice among the feasible regions.
+        count: How many to pick.
+
+    Returns:
+        The targets in an order that tells nothing of their places.
+
+    Raises:
+        TooFewTargetsError: The pile offers fewer than `count` such regions.
+    """
+    centers_w = feasible_centers_w(heights_m, x_w, y_w)
+    apart = np.linalg.norm(centers_w[:, None, :2] - centers_w[None, :, :2], axis=-1) >= LEAST_DISTANCE_M
+    # Greedy picks can block each other: several random orders, then give up.
+    for _ in range(_ORDERS):
+        free = np.ones(len(centers_w), dtype=bool)
+        picked: list[int] = []
+        while len(picked) < count and free.any():
+            picked.append(int(rng.choice(np.flatnonzero(free))))
+            free &= apart[picked[-1]]
+        if len(picked) == count:
+            return tuple(_target(centers_w[i]) for i in picked)
+    raise TooFewTargetsError(f"the pile has no room for {count} dig regions; draw another pile")
+
+
+def target_mask_img(target: Target, terrain_points_w: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Draw the mask of a target: the pixels whose soil surface point lies in the patch.
+
+    Args:
+        target: The dig region.
+        terrain_points_w: Surface point seen by each pixel [m], shape (H, W, 3), NaN where there is no soil.
+
+    Returns:
+        Mask of {0, 255}, shape (H, W, 3), uint8.
+    """
+    inside = target.contains(terrain_points_w)
+    return np.repeat(np.where(inside, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def _target(center_w: NDArray[np.float64]) -> Target:
+    return Target(center_w=center_w.copy(), yaw_rad=cylinder_from_world(center_w)[1])

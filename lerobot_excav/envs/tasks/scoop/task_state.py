@@ -1,0 +1,147 @@
+"""Task state: what is measured at every tick to judge a cycle. Never an input of a policy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.excavator.layout import (
+    DIG_AREA_EXTENT_M,
+    TARGET_BOX,
+    distance_to_box_footprint_m,
+)
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.soil import Tool
+from lerobot_excav.envs.tasks.scoop.targets import Target
+
+TASK_STATE_NAMES = (
+    "bucket_mass_kg",
+    "excavated_mass_kg",
+    "deposited_mass_kg",
+    "distance_to_target_m",
+    "distance_to_box_m",
+    "hard_target_contacts",
+    "bucket_depth_below_dig_plane_m",
+    "spill_before_target_events",
+)
+
+# Thresholds of the events (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
+HARD_CONTACT_FORCE_N = 5000.0
+SPILL_LEAST_PAYLOAD_KG = 50.0
+SPILL_LEAST_DROP_KG = 5.0
+SPILL_BOX_GAIN_KG = 2.0
+FOOTPRINT_FADE_M = 0.25
+
+
+@dataclass(kw_only=True)
+class TaskState:
+    """Running measurements of one cycle; the fields are `TASK_STATE_NAMES`, in their order."""
+
+    bucket_mass_kg: float = 0.0
+    excavated_mass_kg: float = 0.0
+    deposited_mass_kg: float = 0.0
+    distance_to_target_m: float = 0.0
+    distance_to_box_m: float = 0.0
+    hard_target_contacts: int = 0
+    bucket_depth_below_dig_plane_m: float = 0.0
+    spill_before_target_events: int = 0
+
+    def as_array(self) -> NDArray[np.float32]:
+        """Return the values in the order of `TASK_STATE_NAMES`, shape (8,), float32."""
+        return np.array([getattr(self, name) for name in TASK_STATE_NAMES], dtype=np.float32)
+
+
+class TaskMeter:
+    """Keeps the task state up to date, tick by tick.
+
+    Args:
+        worksite: Where the machine works, freshly reset.
+        target: The commanded dig region.
+    """
+
+    def __init__(self, worksite: Worksite, target: Target) -> None:
+        self._worksite = worksite
+        self._target = target
+        self._box_mass_start_kg = worksite.box_mass_kg
+        self._in_hard_contact = False
+        self.state = TaskState()
+        self._measure_places()
+
+    def update(self) -> TaskState:
+        """Take in the tick that has just passed and return the state."""
+        state, previous_bucket_kg, previous_box_kg = (
+            self.state,
+            self.state.bucket_mass_kg,
+            self.state.deposited_mass_kg,
+        )
+        state.bucket_mass_kg = self._worksite.soil.payload_mass_kg
+        state.deposited_mass_kg = max(0.0, self._worksite.box_mass_kg - self._box_mass_start_kg)
+        # Soil that leaves the bucket and enters it again counts twice, as in the definition this follows.
+        state.excavated_mass_kg += max(0.0, state.bucket_mass_kg - previous_bucket_kg)
+        drop_kg = previous_bucket_kg - state.bucket_mass_kg
+        gain_kg = state.deposited_mass_kg - previous_box_kg
+        state.spill_before_target_events += int(self._is_spill(previous_bucket_kg, drop_kg, gain_kg))
+        self._count_hard_contact()
+        self._measure_places()
+        return state
+
+    def _is_spill(self, previous_bucket_kg: float, drop_kg: float, gain_kg: float) -> bool:
+        """Tell whether soil was lost elsewhere than above the box.
+
+        Soil falls for a while before the box gains it, so a drop above the box is no spill either.
+        """
+        over_box = bool(distance_to_box_footprint_m(self._worksite.machine.cutting_edge_pos_w) == 0.0)
+        return (
+            previous_bucket_kg >= SPILL_LEAST_PAYLOAD_KG
+            and drop_kg >= SPILL_LEAST_DROP_KG
+            and gain_kg < SPILL_BOX_GAIN_KG
+            and not over_box
+        )
+
+    def _count_hard_contact(self) -> None:
+        """Count one contact per episode of touching, at the moment it becomes hard."""
+        force_n = self._worksite.machine.box_contact_force_n
+        if force_n >= HARD_CONTACT_FORCE_N and not self._in_hard_contact:
+            self._in_hard_contact = True
+            self.state.hard_target_contacts += 1
+        elif force_n == 0.0:
+            self._in_hard_contact = False
+
+    def _measure_places(self) -> None:
+        edge_w = self._worksite.machine.cutting_edge_pos_w
+        self.state.distance_to_target_m = float(np.linalg.norm(edge_w - self._target.center_w))
+        self.state.distance_to_box_m = distance_to_box_m(edge_w)
+        self.state.bucket_depth_below_dig_plane_m = depth_below_dig_plane_m(self._worksite.tool)
+
+
+def distance_to_box_m(point_w: NDArray[np.float64]) -> float:
+    """Return the distance from a point to the box with its walls [m]; zero inside or above-floor within the walls."""
+    above = max(0.0, point_w[2] - TARGET_BOX.center_w[2] - TARGET_BOX.wall_height_m)
+    return float(np.hypot(distance_to_box_footprint_m(point_w), above))
+
+
+def depth_below_dig_plane_m(tool: Tool) -> float:
+    """Return how far the bucket's bounding box reaches below the dig plane z = 0 inside the dig area [m].
+
+    The greatest depth over a 5 x 5 x 5 sample of the box, faded out over `FOOTPRINT_FADE_M` to both sides of the edge
+    of the dig area. The box and not the shell, as in the definition this follows: its corners reach deeper.
+    """
+    profile = tool.geometry.profile_t
+    low, high = profile.min(axis=0), profile.max(axis=0)
+    half_width = 0.5 * tool.geometry.inner_width_m
+    axes = (
+        np.linspace(low[0], high[0], 5),
+        np.linspace(-half_width, half_width, 5),
+        np.linspace(low[1], high[1], 5),
+    )
+    sample_t = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    sample_w = tool.position_w + sample_t @ tool.rotation_w.T
+    inset = np.min(0.5 * np.array(DIG_AREA_EXTENT_M) - np.abs(sample_w[:, :2]), axis=1)
+    depth = np.maximum(0.0, -sample_w[:, 2])
+    return float(np.max(depth * _smoothstep(inset / FOOTPRINT_FADE_M)))
+
+
+def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rise smoothly from 0 at -1 to 1 at +1."""
+    t = np.clip(0.5 * (x + 1.0), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))

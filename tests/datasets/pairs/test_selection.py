@@ -1,0 +1,157 @@
+from collections import Counter
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.datasets.pairs.pair_coverage import pair_coverage
+from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
+from lerobot_excav.datasets.pairs.split import split
+from lerobot_excav.errors import ConfigurationError, DatasetError
+
+
+def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
+    """Make the columns of an index that selecting needs."""
+    rows = [
+        {
+            "episode_index": number,
+            "pair_uid": f"excavator/train/{scene}/{target}",
+            "env": "excavator",
+            "scene_set": "train",
+            "scene_id": scene,
+            "target_id": target,
+            "soil": "sand",
+            "success": True,
+            "qc": "unchecked",
+        }
+        for number, (scene, target) in enumerate(pairs)
+    ]
+    return pd.DataFrame(rows).assign(**columns)
+
+
+pair_sets = st.sets(st.tuples(st.integers(0, 12), st.integers(0, 3)), min_size=1).map(sorted)
+
+
+@given(pairs=pair_sets, composition=st.sampled_from(COMPOSITIONS), seed=st.integers(0, 5))
+def test_a_selection_has_the_composition_it_names(pairs, composition, seed):
+    index = index_of(pairs)
+    if composition == "paired" and max(Counter(scene for scene, _ in pairs).values()) < len(
+        {target for _, target in pairs}
+    ):
+        with pytest.raises(DatasetError, match="nothing paired to choose"):
+            select(index, composition, seed=seed)
+        return
+    chosen = select(index, composition, seed=seed)
+    assert set(chosen["episode_index"]) <= set(index["episode_index"])
+    assert chosen["episode_index"].is_monotonic_increasing
+    assert chosen["episode_index"].is_unique
+    per_scene = Counter(chosen["scene_id"])
+    per_target = Counter(chosen["target_id"])
+    targets = index["target_id"].nunique()
+    if composition == "paired":
+        assert set(per_scene.values()) == {targets}
+    if composition == "non-paired":
+        assert set(per_scene) == set(index["scene_id"])
+        assert set(per_scene.values()) == {1}
+    if composition == "balanced":
+        assert set(per_target.values()) == {Counter(index["target_id"]).most_common()[-1][1]}
+
+
+@given(scenes=st.integers(1, 12), wanted=st.integers(1, 12), seed=st.integers(0, 5))
+def test_non_paired_targets_are_equally_frequent_where_all_scenes_have_all(scenes, wanted, seed):
+    index = index_of([(s, t) for s in range(scenes) for t in range(4)])
+    if wanted > scenes:
+        with pytest.raises(DatasetError, match=f"only {scenes} are there"):
+            select(index, "non-paired", scenes=wanted, seed=seed)
+        return
+    frequency = Counter(select(index, "non-paired", scenes=wanted, seed=seed)["target_id"])
+    assert max(frequency.values()) - min(frequency[t] for t in range(4)) <= 1
+
+
+@given(few=st.integers(1, 6), more=st.integers(0, 6), seed=st.integers(0, 5))
+def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    small = select(index, "paired", scenes=few, seed=seed)["episode_index"]
+    large = select(index, "paired", episodes=4 * (few + more), seed=seed)["episode_index"]
+    assert set(small) <= set(large)
+    assert len(small) == 4 * few
+
+
+def test_the_seed_changes_the_choice():
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    choices = {tuple(select(index, "paired", scenes=3, seed=seed)["scene_id"]) for seed in range(8)}
+    assert len(choices) > 1
+
+
+def test_failures_rejected_episodes_and_repetitions_are_not_usable():
+    index = index_of([(0, 0), (0, 1), (0, 2), (0, 2)])
+    index.loc[0, "success"] = False
+    index.loc[1, "qc"] = "failed"
+    assert usable(index)["episode_index"].tolist() == [2]
+    assert usable(index, include_failures=True)["episode_index"].tolist() == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"composition": "odd"}, "--select|select="),
+        ({"composition": "paired", "episodes": 6}, "no multiple of the 4 targets"),
+        ({"composition": "paired", "episodes": 4, "scenes": 1}, "exclude each other"),
+        ({"composition": "balanced", "scenes": 1}, "--scenes has no meaning"),
+        ({"composition": "balanced", "episodes": 3}, "cannot be balanced"),
+        ({"composition": "all", "episodes": 0}, "at least 1"),
+    ],
+)
+def test_contradictory_arguments_are_named(arguments, message):
+    index = index_of([(s, t) for s in range(3) for t in range(4)])
+    with pytest.raises(ConfigurationError, match=message):
+        select(index, **arguments)
+
+
+def test_an_empty_index_is_refused():
+    with pytest.raises(DatasetError, match="no usable episode"):
+        select(usable(index_of([(0, 0)], success=False)), "all")
+
+
+def two_soils(pairs: list[tuple[int, int]]) -> pd.DataFrame:
+    both = [index_of(pairs), index_of(pairs, soil="gravel")]
+    index = pd.concat(both, ignore_index=True)
+    return index.assign(episode_index=range(len(index)))
+
+
+def test_a_pair_on_another_soil_is_no_duplicate():
+    assert len(usable(two_soils([(0, 0), (0, 1)]))) == 4
+
+
+def test_a_scene_on_another_soil_counts_as_another_scene():
+    index = two_soils([(0, 0), (0, 1)])
+    index = index[index["episode_index"] != 1]  # sand lacks target 1
+    assert set(select(index, "paired")["soil"]) == {"gravel"}
+    assert len(select(index, "non-paired")) == 2
+
+
+def test_a_split_by_scene_holds_a_scene_out_on_all_soils():
+    index = two_soils([(scene, 0) for scene in range(5)])
+    parts = split(index, "scene", eval_fraction=0.2)
+    held_out = index[index["episode_index"].isin(parts.evaluation)]
+    assert sorted(held_out["soil"]) == ["gravel", "sand"]
+    assert held_out["scene_id"].nunique() == 1
+
+
+def test_coverage_names_the_soil_where_there_are_several():
+    index = two_soils([(0, 0), (0, 1)])
+    coverage = pair_coverage(index[index["episode_index"] != 1])
+    assert coverage.scenes == 2
+    assert coverage.missing == {"excavator/train/0 on sand": [1]}
+    assert coverage.duplicates == {}
+
+
+def test_an_index_without_soil_is_paired_by_scene_alone():
+    index = index_of([(scene, target) for scene in range(3) for target in range(2)]).drop(columns="soil")
+    twice = pd.concat([index, index.iloc[[1]].assign(episode_index=6)], ignore_index=True)
+    assert len(usable(twice)) == 6
+    assert select(usable(twice), "paired", scenes=2)["scene_id"].nunique() == 2
+    coverage = pair_coverage(twice)
+    assert coverage.complete_scenes == 3
+    assert coverage.duplicates == {"excavator/train/0/1": [1, 6]}

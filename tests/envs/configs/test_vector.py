@@ -1,0 +1,285 @@
+"""LeRobot's own evaluation loop counts every episode once, whatever the number of environments.
+
+Most tests use a stand-in environment with episodes of different lengths.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from lerobot.configs import PreTrainedConfig
+from lerobot.policies.pretrained import PreTrainedPolicy
+from lerobot.processor import PolicyProcessorPipeline
+from lerobot.scripts.lerobot_eval import eval_policy
+
+from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
+from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
+from lerobot_excav.envs.configs.metrics_log import MetricsLog
+from lerobot_excav.envs.configs.vector import info_of_env, make_vector_env
+from lerobot_excav.envs.tasks.grasp.simulation_version import SIMULATION_VERSION as FR5_SIMULATION_VERSION
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+from lerobot_excav.errors import ConfigurationError
+
+EPISODES = 5
+ARM_STATE_SIZE = 7  # its actions are as long as its states
+
+
+def episode_length(seed: int) -> int:
+    return 3 + seed % 4
+
+
+def countdown_maker() -> Callable[[], gym.Env[Any, Any]]:
+    # Returns a local class, so that worker processes receive the class itself: they cannot import this file.
+    class Countdown(gym.Env[Any, Any]):
+        observation_space = gym.spaces.Dict({"agent_pos": gym.spaces.Box(-np.inf, np.inf, (1,), np.float32)})
+        action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+        task = task_description = "count down"
+        _max_episode_steps = 20
+
+        def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+            super().reset(seed=seed)
+            self.seed_given = -1 if seed is None else seed
+            self.left = 3 + self.seed_given % 4
+            return self.observe(), {"is_success": False}
+
+        def observe(self) -> dict[str, Any]:
+            return {"agent_pos": np.array([self.left], np.float32)}
+
+        def step(self, action: Any) -> Any:
+            self.left -= 1
+            done = self.left == 0
+            info: dict[str, Any] = {"is_success": done and self.seed_given % 2 == 1}
+            if done:
+                info["episode_metrics"] = {
+                    "scene_id": self.seed_given,
+                    "is_success": info["is_success"],
+                    "command": float(action[0]),
+                    "note": f"seed {self.seed_given}",
+                }
+            return self.observe(), 1.0 + action[0], done, False, info
+
+    return Countdown
+
+
+@PreTrainedConfig.register_subclass("half_for_vector_test")
+@dataclass
+class HalfConfig(PreTrainedConfig):
+    observation_delta_indices = action_delta_indices = reward_delta_indices = None
+
+    def get_optimizer_preset(self) -> Any: ...
+    def get_scheduler_preset(self) -> Any: ...
+    def validate_features(self) -> None: ...
+
+
+class HalfPolicy(PreTrainedPolicy):
+    """Answer every observation with a tenth of its state."""
+
+    config_class = HalfConfig
+    name = "half_for_vector_test"
+
+    def get_optim_params(self) -> dict[str, Any]:
+        return {}
+
+    def reset(self) -> None: ...
+    def forward(self, batch: Any) -> Any: ...
+    def predict_action_chunk(self, batch: Any, **kwargs: Any) -> Any: ...
+
+    def select_action(self, batch: Any, **kwargs: Any) -> Any:
+        state = batch["observation.state"]
+        return 0.1 * (state if state.shape[1] == ARM_STATE_SIZE else state[:, :4])
+
+
+def evaluate(env: Any, start_seed: int = 100) -> Any:
+    identity = PolicyProcessorPipeline(steps=[])
+    action_identity = PolicyProcessorPipeline(
+        steps=[], to_transition=lambda action: {"action": action}, to_output=lambda t: t["action"]
+    )
+    try:
+        return eval_policy(
+            env,
+            HalfPolicy(HalfConfig(device="cpu")),
+            identity,
+            identity,
+            identity,
+            action_identity,
+            n_episodes=EPISODES,
+            start_seed=start_seed,
+        )["per_episode"]
+    finally:
+        env.close()
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Callable[..., Any]:
+    def _run(n_envs: int, *, use_async: bool = False, max_episodes: int | None = EPISODES) -> Any:
+        path = tmp_path / f"{n_envs}{use_async}.jsonl"
+        log = MetricsLog(path, n_envs=n_envs, max_episodes=max_episodes)
+        env = make_vector_env(countdown_maker(), n_envs, use_async=use_async, metrics_log=log)
+        assert isinstance(env, gym.vector.AsyncVectorEnv) is use_async
+        counted = evaluate(env)
+        return counted, [json.loads(line) for line in path.read_text().splitlines()]
+
+    return _run
+
+
+def test_one_environment_counts_the_truth(run: Callable[..., Any]) -> None:
+    counted, lines = run(1)
+    for i, (episode, line) in enumerate(zip(counted, lines, strict=True)):
+        seed = 100 + i
+        steps = episode_length(seed)
+        assert episode["seed"] == line["seed"] == line["scene_id"] == seed
+        assert episode["success"] == line["is_success"] == (seed % 2 == 1)
+        assert episode["sum_reward"] == pytest.approx(steps + 0.1 * sum(range(1, steps + 1)))
+        assert line["note"] == f"seed {seed}"
+
+
+def test_several_environments_count_the_same(run: Callable[..., Any]) -> None:
+    assert run(3) == run(1)
+
+
+def test_the_excavator_gives_the_same_alone_and_beside_others(tmp_path: Path) -> None:
+    results = []
+    for n_envs in (1, 3):
+        path = tmp_path / f"{n_envs}.jsonl"
+        config = ExcavatorEnvConfig(
+            episode_length=4, scene_set="test", metrics_path=path, metrics_episodes=EPISODES
+        )
+        counted = evaluate(config.create_envs(n_envs)["excavator"][0], start_seed=1000)
+        results.append((counted, [json.loads(line) for line in path.read_text().splitlines()]))
+    assert results[0] == results[1]
+    _, lines = results[0]
+    assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
+        (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
+    ]
+    settings = {
+        "task": "Scoop-v0",
+        "scene_set": "test",
+        "mask_condition": "correct",
+        "soil": "sand",
+        "fps": 10,
+    }
+    settings |= {"fidelity": "standard", "episode_length": 4, "simulation_version": SIMULATION_VERSION}
+    assert lines[0].items() >= settings.items()
+    assert {"is_success", "retained_mass_kg", "frames"} <= set(lines[0])
+
+
+def test_the_arm_gives_the_same_alone_and_beside_others(tmp_path: Path) -> None:
+    results = []
+    for n_envs in (1, 3):
+        path = tmp_path / f"{n_envs}.jsonl"
+        config = FR5GraspEnvConfig(
+            episode_length=4,
+            scene_set="test",
+            mask_noise="shift",
+            mask_noise_px=2,
+            metrics_path=path,
+            metrics_episodes=EPISODES,
+        )
+        counted = evaluate(config.create_envs(n_envs)["fr5_grasp"][0], start_seed=1000)
+        results.append((counted, [json.loads(line) for line in path.read_text().splitlines()]))
+    assert results[0] == results[1]
+    _, lines = results[0]
+    assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
+        (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
+    ]
+    settings = {
+        "task": "FR5Grasp-v0",
+        "simulation_version": FR5_SIMULATION_VERSION,
+        "scene_set": "test",
+        "mask_condition": "correct",
+        "mask_noise": "shift",
+        "mask_noise_px": 2,
+        "retarget_frame": None,
+        "fps": 50,
+        "episode_length": 4,
+        "frames": 4,
+        "is_success": False,
+        "first_grasped_block": -1,
+        "blocks_in_tray": 0,
+    }
+    assert lines[0].items() >= settings.items()
+    wanted = {
+        "final_target_id",
+        "episode_return",
+        "max_reward",
+        "target_grasped",
+        "target_in_tray",
+        "released",
+    }
+    assert wanted <= set(lines[0])
+
+
+@pytest.mark.slow
+def test_environments_in_processes_of_their_own_count_the_same(run: Callable[..., Any]) -> None:
+    assert run(2, use_async=True) == run(1)
+
+
+@pytest.mark.parametrize("use_async", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_lerobot_learns_the_length(*, use_async: bool) -> None:
+    config = ExcavatorEnvConfig(episode_length=7)
+    env = config.create_envs(2, use_async_envs=use_async)["excavator"][0]
+    assert env.call("_max_episode_steps") == (7, 7)
+    env.close()
+
+
+def test_surplus_episodes_are_recognisable(run: Callable[..., Any]) -> None:
+    counted, lines = run(3, max_episodes=None)
+    assert [line["episode_ix"] for line in lines] == [0, 1, 2, 3, 4, 5]
+    assert len(counted) == EPISODES
+
+
+def test_a_finished_environment_costs_nothing_and_repeats_its_end() -> None:
+    env = make_vector_env(countdown_maker(), 2)
+    env.reset(seed=[100, 103], options={"lerobot_new_rollout": True})
+    rewards, lefts = [], []
+    for _ in range(6):
+        observation, reward, *_ = env.step(np.zeros((2, 1), np.float32))
+        rewards.append(reward[0])
+        lefts.append(observation["agent_pos"][0, 0])
+    assert rewards == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    assert lefts == [2.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    env.close()
+
+
+def test_a_plain_reset_begins_a_new_batch(tmp_path: Path) -> None:
+    path = tmp_path / "metrics.jsonl"
+    config = ExcavatorEnvConfig(
+        observation_height=32, observation_width=48, episode_length=2, metrics_path=path
+    )
+    env = config.create_envs(1)["excavator"][0]
+    still = np.zeros((1, 4), np.float32)
+    scenes = []
+    for batch in range(2):
+        _, info = env.reset()
+        scenes.append(int(info["scene_id"][0]))
+        env.step(still)
+        assert len(path.read_text().splitlines()) == batch
+        env.step(still)
+    env.close()
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert scenes[0] != scenes[1]
+    assert [(line["episode_ix"], line["scene_id"]) for line in lines] == list(enumerate(scenes))
+
+
+def test_info_of_env_leaves_out_what_another_environment_said() -> None:
+    infos = {"a": np.array([1, 0]), "_a": np.array([True, False]), "b": {"c": np.array([0, 2])}}
+    infos |= {"_b": np.array([False, True])}
+    infos["b"]["_c"] = np.array([False, True])
+    assert info_of_env(infos, 0) == {"a": 1}
+    assert info_of_env(infos, 1) == {"b": {"c": 2}}
+
+
+def test_no_environment_at_all_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="n_envs=0"):
+        make_vector_env(countdown_maker(), 0)
+
+
+def test_one_environment_stays_in_this_process() -> None:
+    env = make_vector_env(countdown_maker(), 1, use_async=True)
+    assert isinstance(env, gym.vector.SyncVectorEnv)
+    env.close()

@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW, axes
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+
+HEIGHT, WIDTH = 96, 128
+
+
+def project(pose, points_w):
+    """Image coordinates (column, row) of world points at the default image size."""
+    local = (np.atleast_2d(points_w) - pose.position) @ axes(pose)
+    focal = 0.5 * HEIGHT / np.tan(0.5 * np.radians(pose.fovy_deg))
+    return np.stack(
+        [WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1
+    )
+
+
+def in_picture(pose, points_w):
+    pixels = project(pose, points_w)
+    return ((pixels >= 0) & (pixels <= [WIDTH, HEIGHT])).all()
+
+
+@pytest.mark.parametrize("pose", [MAIN, CAB, OVERVIEW])
+def test_camera_axes_are_a_right_handed_frame_that_keeps_up_up(pose):
+    rotation = axes(pose)
+    np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+    assert rotation[2, 1] > 0
+    assert rotation[2, 0] == pytest.approx(0.0)
+
+
+def rectangle(half_x, half_y, center=(0.0, 0.0, 0.0), height=0.0):
+    return [np.add(center, (x, y, height)) for x in (-half_x, half_x) for y in (-half_y, half_y)]
+
+
+def test_main_sees_every_place_where_a_pile_can_be():
+    assert in_picture(MAIN, rectangle(2.1, 2.1))
+    assert in_picture(MAIN, rectangle(1.0, 1.5, height=1.2))
+
+
+def test_main_sees_into_the_target_box():
+    assert in_picture(MAIN, rectangle(0.5, 0.5, center=TARGET_BOX.center_w))
+
+
+def test_main_sees_the_cab_and_the_tracks():
+    assert in_picture(
+        MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))]
+    )
+
+
+def test_overview_sees_the_whole_dig_area_the_box_and_the_raised_boom():
+    assert in_picture(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)))
+    for height in (0.0, TARGET_BOX.wall_height_m):
+        assert in_picture(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, height))
+    assert in_picture(
+        OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))]
+    )
+
+
+def test_cab_sees_the_middle_of_the_box_over_its_wall():
+    eye = np.array([*const.MACHINE_POS_W[:2], const.SWING_HEIGHT_M + CAB.position[2]])
+    to_box = TARGET_BOX.center_w[:2] - eye[:2]
+    distance = np.hypot(*to_box) - CAB.position[0]
+    wall = distance - TARGET_BOX.half_extent_m.min() - const.BOX_WALL_THICKNESS_M
+    line_of_sight = eye[2] + (TARGET_BOX.wall_height_m - eye[2]) * distance / wall
+    assert line_of_sight < 0.4  # the height of one scoop's heap
+
+
+@pytest.mark.parametrize("x", [-1.5, 0.0, 1.5])
+@pytest.mark.parametrize("y", [-1.5, 0.0, 1.5])
+def test_dig_region_is_large_enough_in_the_default_picture(x, y):
+    corners = [(x + dx, y + dy, 0.4) for dx in (-0.4, 0.4) for dy in (-0.4, 0.4)]
+    width, height = np.ptp(project(MAIN, corners), axis=0)
+    assert width >= 9.0
+    assert height >= 6.0
+
+
+@pytest.mark.parametrize("x", [-1.6, 0.0, 2.0])
+@pytest.mark.parametrize("y", [-2.0, 0.0, 1.8])
+def test_main_looks_down_more_steeply_than_a_pile_of_sand_is(x, y):
+    to_camera = np.subtract(MAIN.position, (x, y, 0.3))
+    assert np.degrees(np.arctan2(to_camera[2], np.hypot(*to_camera[:2]))) > 40.0

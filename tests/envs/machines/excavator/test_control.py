@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.excavator.control import RateControl, checked_action
+from lerobot_excav.errors import ConfigurationError
+
+HOME = [0.2, 0.5, -1.8, -0.6]
+DT = const.SUBSTEP_S
+
+
+def follow(control, command, steps):
+    """Step with joints that follow their reference perfectly; return the reference positions."""
+    trace = []
+    for _ in range(steps):
+        control.step(command, control.reference_pos, DT)
+        trace.append(list(control.reference_pos))
+    return np.array(trace)
+
+
+@pytest.fixture
+def control():
+    control = RateControl()
+    control.reset(HOME)
+    return control
+
+
+def test_zero_command_does_not_move_the_reference(control):
+    np.testing.assert_array_equal(follow(control, [0.0] * 4, 1000), np.tile(HOME, (1000, 1)))
+
+
+@pytest.mark.parametrize("joint", range(4))
+def test_full_stick_ramps_at_the_rated_acceleration_to_the_rated_speed(control, joint):
+    command = [0.0] * 4
+    command[joint] = 0.5
+    speeds = np.diff(follow(control, command, 600)[:, joint]) / DT
+    accel, speed = const.JOINT_ACCEL_RAD_S2[joint], 0.5 * const.JOINT_SPEED_RAD_S[joint]
+    assert np.diff(speeds).max() / DT <= accel * (1 + 1e-6)
+    assert speeds.max() == pytest.approx(speed)
+
+
+def test_velocity_lead_cancels_the_damping_of_the_servo(control):
+    set_points = control.step([1.0, 0.0, 0.0, 0.0], HOME, DT)
+    lead = set_points[0] - control.reference_pos[0]
+    force = const.SERVO_STIFFNESS_NM_RAD[0] * lead - const.SERVO_DAMPING_NMS_RAD[0] * control.reference_vel[0]
+    assert force == pytest.approx(0.0, abs=1e-6)
+    assert lead > 0
+
+
+def test_stalled_joint_does_not_wind_up(control):
+    for _ in range(2000):
+        control.step([0.0, 1.0, 0.0, 0.0], HOME, DT)
+    assert control.reference_pos[1] - HOME[1] == pytest.approx(const.SERVO_DEFLECTION_RAD)
+
+
+def test_joint_pushed_away_takes_the_reference_along(control):
+    pushed = [HOME[0], HOME[1] - 0.1, *HOME[2:]]
+    control.step([0.0] * 4, pushed, DT)
+    assert control.reference_pos[1] == pytest.approx(pushed[1] + const.SERVO_DEFLECTION_RAD)
+
+
+@pytest.mark.parametrize("joint", range(4))
+@pytest.mark.parametrize("direction", [-1.0, 1.0])
+def test_reference_stops_at_the_joint_limit_without_a_jolt(control, joint, direction):
+    command = [0.0] * 4
+    command[joint] = direction
+    trace = follow(control, command, 4000)[:, joint]
+    lower, upper = const.JOINT_RANGE_RAD[joint]
+    assert trace.min() >= lower
+    assert trace.max() <= upper
+    assert trace[-1] == pytest.approx(upper if direction > 0 else lower, abs=1e-3)
+    decel = np.abs(np.diff(trace, 2)).max() / DT**2
+    assert decel <= 2.0 * const.JOINT_ACCEL_RAD_S2[joint]
+
+
+def test_reset_forgets_speed_and_place(control):
+    follow(control, [1.0] * 4, 100)
+    control.reset(HOME)
+    assert control.reference_pos == HOME
+    assert control.reference_vel == [0.0] * 4
+
+
+def test_action_beyond_the_stick_is_clipped():
+    np.testing.assert_array_equal(checked_action([2.0, -3.0, 0.5, 0.0]), [1.0, -1.0, 0.5, 0.0])
+
+
+@pytest.mark.parametrize(
+    "action", [[0.0] * 3, [[0.0] * 4], 0.0, [0.0, np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0, 0.0]]
+)
+def test_action_of_wrong_shape_or_not_finite_is_refused(action):
+    with pytest.raises(ConfigurationError, match="action"):
+        checked_action(action)

@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.excavator import load_picture
+from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
+from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
+from lerobot_excav.envs.machines.excavator.load_picture import LOAD_SKIN, LoadPicture, load_grid
+from lerobot_excav.envs.machines.excavator.mjcf import build_spec
+
+RADIUS_M = 0.045
+
+
+@pytest.fixture
+def model():
+    return build_spec(TARGET_BOX, (2.0, 2.0)).compile()
+
+
+def surface(model):
+    """The z_t of the skin at the vertices of its grid."""
+    shape = load_grid().shape[:2]
+    start = model.skin_vertadr[model.skin(LOAD_SKIN).id]
+    return model.skin_vert[start : start + shape[0] * shape[1], 2].reshape(shape)
+
+
+def layer(z_t):
+    """Parcels side by side at one depth, from cheek to cheek."""
+    x, y = np.meshgrid(np.arange(0.35, 1.0, 0.08), np.arange(-0.32, 0.33, 0.08))
+    places = np.stack([x, y, np.full_like(x, z_t)], axis=-1).reshape(-1, 3)
+    return places, np.full(len(places), RADIUS_M)
+
+
+def test_the_grid_covers_the_opening():
+    geometry = bucket_geometry()
+    grid = load_grid()
+    assert grid[..., 0].min() == geometry.profile_t[-1, 0]
+    assert grid[..., 0].max() == geometry.profile_t[0, 0]
+    assert np.ptp(grid[..., 1]) == pytest.approx(geometry.inner_width_m)
+
+
+@pytest.mark.parametrize("z_t", [0.2, 0.0, -0.15])
+def test_the_skin_lies_on_the_parcels(model, z_t):
+    LoadPicture(model).show(*layer(z_t))
+    grid = load_grid()
+    middle = (np.abs(grid[..., 1]) < 0.25) & (grid[..., 0] > 0.45) & (grid[..., 0] < 0.85)
+    depth = surface(model)[middle]
+    assert depth.min() > z_t - RADIUS_M
+    assert depth.max() < z_t + 0.5 * RADIUS_M
+
+
+def test_no_skin_without_a_load(model):
+    picture = LoadPicture(model)
+    skin = model.skin(LOAD_SKIN).id
+    assert len(picture.show(*layer(0.1))) > 0
+    assert model.skin_group[skin] == LOOSE_SOIL_GROUP
+    picture.show(np.zeros((0, 3)), np.zeros(0))
+    assert model.skin_group[skin] == HIDDEN_GROUP
+
+
+def test_the_skin_never_leaves_through_the_shell(model):
+    LoadPicture(model).show(np.array([(0.6, 0.0, 0.9), (0.5, 0.1, 0.48)]), np.full(2, RADIUS_M))
+    geometry = bucket_geometry()
+    places = np.concatenate([load_grid(), surface(model)[..., None]], axis=-1).reshape(-1, 3)
+    bottom = geometry.planes_t[1:-2]  # all plates but the cheeks
+    assert (places @ bottom[:, :3].T - bottom[:, 3]).max() <= 0.02 + 1e-6
+
+
+def test_parcels_below_the_skin_are_not_seen(model):
+    upper, lower = layer(0.05), layer(0.25)
+    seen = LoadPicture(model).show(np.concatenate([upper[0], lower[0]]), np.concatenate([upper[1], lower[1]]))
+    assert not seen[len(upper[0]) :].any()
+
+
+def test_a_parcel_that_stands_out_is_seen(model):
+    places, radii = layer(0.15)
+    seen = LoadPicture(model).show(np.append(places, [(0.6, 0.0, -0.1)], axis=0), np.append(radii, RADIUS_M))
+    assert seen[-1]
+
+
+def test_the_skin_faces_out_of_the_opening(model):
+    LoadPicture(model).show(*layer(0.1))
+    index = model.skin(LOAD_SKIN).id
+    first, start = model.skin_faceadr[index], model.skin_vertadr[index]
+    vertices = model.skin_vert[start : start + model.skin_vertnum[index]]
+    sheet = model.skin_face[first : first + 2 * np.prod(np.subtract(load_grid().shape[:2], 1))]
+    a, b, c = (vertices[sheet[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a)[:, 2] < 0.0).all()
+
+
+def test_smoothing_keeps_a_plane():
+    x, y = np.indices((6, 5)).astype(float)
+    plane = 0.2 * x - 0.1 * y
+    np.testing.assert_allclose(load_picture._smooth(plane)[1:-1, 1:-1], plane[1:-1, 1:-1], atol=1e-12)

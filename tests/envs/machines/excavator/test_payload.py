@@ -1,0 +1,199 @@
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
+from lerobot_excav.envs.machines.excavator.mjcf import build_spec
+from lerobot_excav.envs.machines.excavator.payload import Payload
+
+COM_T = np.array([0.65, 0.1, 0.15])
+
+
+@pytest.fixture
+def model():
+    return build_spec(TARGET_BOX, (6.0, 6.0)).compile()
+
+
+@pytest.fixture
+def payload(model):
+    return Payload(model)
+
+
+def fill(payload, mass_kg, com_t=COM_T, ticks=10):
+    for _ in range(ticks):
+        for remaining in range(10, 0, -1):
+            payload.approach(mass_kg, com_t, remaining)
+
+
+def test_new_bucket_is_empty(model, payload):
+    assert payload.mass_kg == 0.0
+    assert model.body("payload").mass[0] == 0.0
+    assert not model.body("payload").inertia.any()
+
+
+def test_payload_arrives_within_the_tick_when_the_change_is_small(model, payload):
+    fill(payload, 100.0, ticks=1)
+    assert model.body("payload").mass[0] == pytest.approx(100.0)
+    np.testing.assert_allclose(model.body("payload").ipos, COM_T)
+
+
+def test_mass_never_changes_faster_than_its_rate(model, payload):
+    limit = const.PAYLOAD_RATE_KG_S * const.SUBSTEP_S
+    masses = [0.0]
+    for target in (485.0, 0.0):
+        for _ in range(3):
+            for remaining in range(10, 0, -1):
+                payload.approach(target, COM_T, remaining)
+                masses.append(payload.mass_kg)
+    assert np.abs(np.diff(masses)).max() <= limit + 1e-9
+    assert max(masses) == pytest.approx(485.0)
+    assert masses[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_load_adds_its_weight_about_every_pin(model, payload):
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.3, 0.5, -1.6, -0.4]
+
+    def bias():
+        mujoco.mj_forward(model, data)
+        return data.qfrc_bias.copy()
+
+    empty = bias()
+    fill(payload, 485.0)
+    loaded = bias()
+    com_w = data.body("payload").xipos
+    jacobian = np.zeros((3, 4))
+    mujoco.mj_jac(model, data, jacobian, None, com_w, model.body("payload").id)
+    np.testing.assert_allclose(
+        loaded - empty, -jacobian.T @ [0, 0, -485.0 * const.GRAVITY_M_S2], rtol=1e-9, atol=1e-6
+    )
+
+
+def test_load_adds_to_the_inertia_of_the_swing(model, payload):
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.0, 0.3, -0.8, -0.3]
+    inertia = []
+    for mass in (0.0, 485.0):
+        fill(payload, mass)
+        mujoco.mj_forward(model, data)
+        column = np.zeros(4)
+        mujoco.mj_mulM(model, data, column, np.array([1.0, 0.0, 0.0, 0.0]))
+        inertia.append(column[0])
+    radius = np.hypot(*(data.body("payload").xipos - const.MACHINE_POS_W)[:2])
+    assert inertia[1] - inertia[0] == pytest.approx(485.0 * radius**2, rel=0.01)
+
+
+def test_reset_empties_the_bucket_at_once(model, payload):
+    fill(payload, 300.0)
+    payload.reset()
+    assert model.body("payload").mass[0] == 0.0
+
+
+def passive(model):
+    """Take motors, gravity and joint limits away: what is left is a mechanism that keeps its momentum."""
+    model.actuator_gainprm[:] = 0.0
+    model.actuator_biasprm[:] = 0.0
+    model.opt.gravity[:] = 0.0
+    model.jnt_limited[:] = 0
+    return mujoco.MjData(model)
+
+
+def coast(model, data, payload, mass_kg, com_t, ticks):
+    """Coast while the payload changes; return energies [J] and momenta of the swing [N m s] after each substep."""
+    energies, momenta, mass = [], [], np.zeros((4, 4))
+    for _ in range(ticks):
+        for remaining in range(10, 0, -1):
+            payload.approach(mass_kg, com_t, remaining)
+            mujoco.mj_step1(model, data)
+            data.qfrc_applied[:] = 0.0
+            payload.apply_momentum(data)
+            mujoco.mj_step2(model, data)
+            mujoco.mj_forward(model, data)
+            for row, unit in zip(mass, np.eye(4), strict=True):
+                mujoco.mj_mulM(model, data, row, unit)
+            energies.append(0.5 * data.qvel @ mass @ data.qvel)
+            momenta.append((mass @ data.qvel)[0])
+    return np.array(energies), np.array(momenta)
+
+
+def swinging(model, joint_vel=(0.8, 0.0, 0.0, 0.0)):
+    data = passive(model)
+    data.qpos[:] = [0.0, 0.3, -0.8, -0.3]
+    data.qvel[:] = joint_vel
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def test_soil_that_joins_at_rest_shares_the_momentum_and_costs_energy(model, payload):
+    """An inelastic impact: momentum stays, energy falls as the inertia grows."""
+    data = swinging(model)
+    start, momentum = coast(model, data, payload, 0.0, COM_T, 1)
+    energies, momenta = coast(model, data, payload, 485.0, COM_T, 10)
+    assert payload.mass_kg == pytest.approx(485.0)
+    np.testing.assert_allclose(momenta, momentum[-1], rtol=2e-3)
+    assert (np.diff(energies) <= 1e-3 * energies[0]).all()
+    assert energies[-1] < 0.85 * start[-1]
+
+
+def test_without_that_cost_a_bucket_would_gain_energy_as_it_fills(model, payload, monkeypatch):
+    monkeypatch.setattr(payload, "apply_momentum", lambda _: None)
+    data = swinging(model)
+    start, _ = coast(model, data, payload, 0.0, COM_T, 1)
+    energies, _ = coast(model, data, payload, 485.0, COM_T, 10)
+    assert energies[-1] > 1.1 * start[-1]
+
+
+def test_soil_that_leaves_takes_its_momentum_along(model, payload):
+    fill(payload, 485.0)
+    data = swinging(model)
+    coast(model, data, payload, 485.0, COM_T, 1)
+    before = data.qvel[0]
+    energies, _ = coast(model, data, payload, 0.0, COM_T, 3)
+    assert payload.mass_kg == pytest.approx(0.0, abs=1e-9)
+    assert data.qvel[0] == pytest.approx(before, rel=0.02)
+    assert (np.diff(energies) <= 1e-3 * energies[0]).all()
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 500.0), st.floats(0.2, 1.0), st.floats(-0.3, 0.3), st.floats(0.0, 0.5)),
+        min_size=1,
+        max_size=5,
+    ),
+    st.tuples(*[st.floats(-0.8, 0.8)] * 4),
+)
+@settings(max_examples=25, deadline=None)
+def test_no_load_that_comes_goes_or_shifts_gives_energy_to_the_machine(loads, joint_vel):
+    model = build_spec(TARGET_BOX, (6.0, 6.0)).compile()
+    payload, data = Payload(model), swinging(model, joint_vel)
+    start, _ = coast(model, data, payload, 0.0, COM_T, 1)
+    for mass_kg, *com_t in loads:
+        energies, _ = coast(model, data, payload, mass_kg, np.array(com_t), 2)
+        assert energies.max() <= start.max() * 1.01 + 1e-9
+
+
+def test_a_steady_load_takes_no_force(model, payload):
+    data = swinging(model)
+    fill(payload, 300.0)
+    payload.approach(300.0, COM_T, 1)
+    data.qfrc_applied[:] = 0.0
+    payload.apply_momentum(data)
+    assert not data.qfrc_applied.any()
+
+
+def test_the_momentum_is_that_of_the_joined_part(model, payload):
+    """Against the sum over the joined mass as a rigid body, through MuJoCo's own Jacobian."""
+    data = swinging(model, (0.4, -0.3, 0.5, 0.7))
+    payload.approach(20.0, COM_T, 1)
+    mujoco.mj_forward(model, data)
+    data.qfrc_applied[:] = 0.0
+    payload.apply_momentum(data)
+    body, linear, angular = model.body("payload"), np.zeros((3, 4)), np.zeros((3, 4))
+    mujoco.mj_jacBodyCom(model, data, linear, angular, body.id)
+    rotation = data.body("payload").xmat.reshape(3, 3)
+    inertia = rotation @ np.diag(body.inertia) @ rotation.T
+    momentum = body.mass[0] * linear.T @ linear @ data.qvel + angular.T @ inertia @ angular @ data.qvel
+    np.testing.assert_allclose(-data.qfrc_applied * const.SUBSTEP_S, momentum, rtol=1e-9, atol=1e-12)

@@ -1,0 +1,191 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.fr5 import layout
+from lerobot_excav.envs.tasks.grasp.scene import draw_scene
+from lerobot_excav.envs.tasks.grasp.task import TASK_STATE_NAMES, GraspTask
+from lerobot_excav.errors import ConfigurationError
+
+SCENE = draw_scene("train", 2)
+IN_TRAY = (*layout.TRAY_POS_W, layout.TRAY_HEIGHT_M + layout.block_rest_height_m())
+
+
+def put(workcell, block, position_w):
+    joint = workcell.data.joint(f"block{block}")
+    joint.qpos[:] = [*position_w, 1, 0, 0, 0]
+    joint.qvel[:] = 0
+
+
+def hold(workcell, ticks=5):
+    for _ in range(ticks):
+        workcell.tick(np.append(SCENE.joint_pos, 1.0))
+
+
+@pytest.fixture
+def task(workcell):
+    workcell.reset(SCENE)
+    return GraspTask(workcell, SCENE, 1)
+
+
+def test_nothing_done_is_worth_nothing(task, workcell):
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert task.episode_metrics["first_grasped_block"] == layout.NO_BLOCK
+
+
+def test_the_commanded_block_alone_in_the_tray_is_success(task, workcell):
+    put(workcell, 1, IN_TRAY)
+    hold(workcell)
+    assert task.update() == 4.0
+    assert task.is_success
+
+
+def test_another_block_in_the_tray_is_no_success(task, workcell):
+    put(workcell, 2, IN_TRAY)
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert task.episode_metrics["blocks_in_tray"] == 1
+    assert not task.episode_metrics["target_in_tray"]
+
+
+def test_after_a_change_of_command_the_first_grasped_block_is_asked_anew(task, workcell, monkeypatch):
+    def grasp(block):
+        touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
+        if block is not None:
+            put(workcell, block, (0.1, 0.5, layout.block_rest_height_m() + 0.1))
+            hold(workcell, 1)
+            touching[:, block] = True
+        monkeypatch.setattr(workcell, "fingers_touching", lambda: touching)
+        task.update()
+        return task.episode_metrics["first_grasped_block"]
+
+    assert grasp(2) == 2
+    task.retarget(3)
+    assert grasp(2) == layout.NO_BLOCK  # still held from before
+    assert grasp(None) == layout.NO_BLOCK
+    assert grasp(3) == 3
+    assert task.episode_metrics["target_grasped"]
+    assert grasp(None) == 3
+
+
+def test_a_second_block_in_the_tray_spoils_the_success(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (-0.03, 0, 0)))
+    put(workcell, 3, np.add(IN_TRAY, (0.03, 0, 0)))
+    hold(workcell)
+    task.update()
+    assert not task.is_success
+    assert task.episode_metrics["blocks_in_tray"] == 2
+
+
+def test_a_block_in_the_tray_that_a_finger_touches_is_not_released(task, workcell, monkeypatch):
+    put(workcell, 1, IN_TRAY)
+    hold(workcell)
+    # By any part of the gripper: pads, rods or hand.
+    monkeypatch.setattr(workcell, "arm_touching", lambda: np.arange(layout.BLOCK_COUNT) == 1)
+    assert task.update() == 0.0
+    assert not task.is_success
+    assert not task.episode_metrics["released"]
+
+
+def test_another_block_that_still_moves_in_the_tray_spoils_the_success(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (-0.03, 0, 0)))
+    hold(workcell)
+    put(workcell, 3, np.add(IN_TRAY, (0.03, 0, 0.05)))
+    workcell.tick(np.append(SCENE.joint_pos, 1.0))
+    assert task.update() == 4.0
+    assert task.episode_metrics["blocks_in_tray"] == 1
+    assert not task.is_success
+
+
+def test_a_block_on_the_rim_is_not_in_the_tray(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (0.077, 0, layout.TRAY_RIM_M)))
+    hold(workcell)
+    assert task.update() == 0.0
+    assert not task.is_success
+
+
+@pytest.mark.parametrize("offset", [(-layout.TRAY_RADIUS_M - 0.01, 0, 0), (0, 0, layout.BLOCK_SIZE_M)])
+def test_a_block_beside_the_tray_or_above_its_floor_is_not_in_it(task, workcell, offset):
+    put(workcell, 1, np.add(IN_TRAY, offset))
+    workcell.tick(np.append(SCENE.joint_pos, 1.0))
+    workcell.data.joint("block1").qvel[:] = 0
+    task.update()
+    assert not task.episode_metrics["target_in_tray"]
+
+
+def test_a_block_that_still_moves_does_not_rest(task, workcell):
+    put(workcell, 1, np.add(IN_TRAY, (0, 0, 0.008)))
+    workcell.data.joint("block1").qvel[0] = 0.3
+    hold(workcell, 1)
+    task.update()
+    assert not task.is_success
+
+
+def test_stages_of_the_reward_come_in_order_and_end_at_their_greatest(play):
+    task, rewards, _ = play(2, 1)
+    assert task.is_success
+    assert set(rewards) == {0.0, 1.0, 2.0, 3.0, 4.0}
+    first = [int(np.argmax(rewards == stage)) for stage in (1.0, 2.0, 3.0, 4.0)]
+    assert first == sorted(first)
+    assert rewards[-1] == 4.0
+    assert task.episode_metrics["episode_return"] == rewards.sum() > 700
+    assert task.episode_metrics["max_reward"] == 4.0
+
+
+def test_a_block_that_the_operator_fetches_counts_as_grasped(play):
+    task, _, _ = play(2, 3)
+    assert task.episode_metrics["first_grasped_block"] == 3
+    assert task.episode_metrics["target_grasped"]
+
+
+def lift(task, workcell, monkeypatch, block, pads):
+    """Show the task a block 10 cm above the table that some of the pads touch; return the frame's reward."""
+    position_w = workcell.block_pos_w
+    position_w[block, 2] += 0.1
+    touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
+    touching[:pads, block] = True
+    with monkeypatch.context() as patch:
+        patch.setattr(type(workcell), "block_pos_w", position_w)
+        patch.setattr(workcell, "fingers_touching", lambda: touching)
+        return task.update()
+
+
+def test_the_first_grasped_block_is_remembered_when_another_is_lifted(task, workcell, monkeypatch):
+    for block in (3, 1):
+        lift(task, workcell, monkeypatch, block, pads=2)
+    assert task.episode_metrics["first_grasped_block"] == 3
+    assert not task.episode_metrics["target_grasped"]
+
+
+@pytest.mark.parametrize(("pads", "reward"), [(0, 0.0), (1, 0.0), (2, 2.0)])
+def test_a_block_is_lifted_by_both_fingers_only(task, workcell, monkeypatch, pads, reward):
+    assert lift(task, workcell, monkeypatch, 1, pads) == reward
+    assert task.episode_metrics["first_grasped_block"] == (1 if pads == 2 else layout.NO_BLOCK)
+
+
+def test_task_state_tells_of_the_commanded_block(task, workcell):
+    hold(workcell)
+    task.update()
+    state = dict(zip(TASK_STATE_NAMES, task.task_state, strict=True))
+    distance = np.linalg.norm(workcell.block_pos_w[1] - workcell.grasp_pos_w)
+    assert state["gripper_to_target_m"] == pytest.approx(distance, rel=1e-6)
+    assert state["target_height_m"] == pytest.approx(0.0, abs=1e-3)
+    assert state["first_grasped_block"] == layout.NO_BLOCK
+
+
+def test_a_new_command_is_what_success_is_judged_by(task, workcell):
+    put(workcell, 2, IN_TRAY)
+    task.retarget(2)
+    hold(workcell)
+    assert task.update() == 4.0
+    assert task.is_success
+    assert task.episode_metrics["target_id"] == 1
+    assert task.episode_metrics["final_target_id"] == 2
+
+
+@pytest.mark.parametrize("target_id", [-1, 4])
+def test_an_unknown_block_is_refused(task, target_id):
+    with pytest.raises(ConfigurationError, match="target_id"):
+        task.retarget(target_id)

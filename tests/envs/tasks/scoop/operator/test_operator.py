@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.excavator.constants import JOINT_ACCEL_RAD_S2, JOINT_SPEED_RAD_S
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import PHASES, ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator.path import JointMotion
+from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor
+
+
+@pytest.fixture(scope="module")
+def env():
+    return ExcavatorEnv(scene_set="val", obs_type="agent_pos")
+
+
+def drive(env, *, scene_id, target_id, seed):
+    env.reset(options={"scene_id": scene_id, "target_id": target_id})
+    operator = ScriptedOperator(rng=np.random.default_rng(seed))
+    operator.reset(env)
+    actions, phases, over = [], [], False
+    while not over:
+        actions.append(operator.act(env))
+        phases.append(operator.phase)
+        _, _, terminated, truncated, info = env.step(actions[-1])
+        over = terminated or truncated
+    return np.array(actions), phases, info["episode_metrics"]
+
+
+@pytest.mark.parametrize("scene_id", range(3))
+@pytest.mark.parametrize("target_id", range(4))
+def test_operator_digs_every_target_of_a_scene(env, scene_id, target_id):
+    actions, _, metrics = drive(env, scene_id=scene_id, target_id=target_id, seed=scene_id)
+    assert metrics["target_success"]
+    assert metrics["is_success"]
+    assert metrics["hard_target_contacts"] == 0
+    assert 350.0 <= metrics["retained_mass_kg"] <= 600.0
+    assert np.abs(actions).max() <= 1.0
+
+
+def test_operator_goes_through_its_phases_in_order(env):
+    _, phases, _ = drive(env, scene_id=0, target_id=0, seed=0)
+    ranks = [PHASES.index(phase) for phase in phases]
+    assert ranks == sorted(ranks)
+    assert set(phases) >= set(PHASES[:-1])
+
+
+def test_same_generator_gives_the_same_demonstration(env):
+    a, _, _ = drive(env, scene_id=1, target_id=2, seed=3)
+    b, _, _ = drive(env, scene_id=1, target_id=2, seed=3)
+    assert np.array_equal(a, b)
+
+
+def test_other_generator_gives_another_style(env):
+    a, _, _ = drive(env, scene_id=1, target_id=2, seed=3)
+    b, _, _ = drive(env, scene_id=1, target_id=2, seed=4)
+    assert a.shape != b.shape or not np.allclose(a, b)
+
+
+def test_joint_motion_keeps_to_speeds_and_ends_where_it_should():
+    path = np.array([[0.0, 0.1, -1.0, 0.0], [0.9, 0.5, -1.4, -0.8], [1.4, 0.2, -1.8, -1.0]])
+    motion = JointMotion(path, speed=0.9)
+    times = np.arange(0.0, motion.duration_s, 0.01)
+    velocity = np.array([motion.at(t)[1] for t in times])
+    assert np.all(np.abs(velocity) <= 0.9 * np.array(JOINT_SPEED_RAD_S) + 1e-6)
+    assert np.allclose(motion.at(motion.duration_s)[0], path[-1], atol=1e-9)
+    assert np.allclose(motion.at(0.0)[0], path[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("distance_rad", [0.02, 0.5, 3.0])
+def test_joint_motion_starts_within_the_machines_acceleration(distance_rad):
+    motion = JointMotion([np.zeros(4), np.array([distance_rad, 0.0, 0.0, 0.0])], speed=1.0)
+    velocity = np.array([motion.at(t)[1] for t in np.arange(0.0, motion.duration_s, 0.02)])[:, 0]
+    assert np.abs(np.diff(velocity)).max() / 0.02 <= JOINT_ACCEL_RAD_S2[0]
+
+
+def test_tremor_has_the_size_it_is_given():
+    tremor = Tremor(np.random.default_rng(0), size=0.05)
+    values = np.array([tremor.step(0.1) for _ in range(4000)])
+    assert values.std() == pytest.approx(0.05, rel=0.1)
+    still = Tremor(np.random.default_rng(0), size=0.0)
+    assert not still.step(0.1).any()

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.scoop.cycle import SETTLING_TICKS, DigCycle
+from lerobot_excav.envs.tasks.scoop.scene import draw_scene
+
+OVER_BOX = TARGET_BOX.center_w + np.array([0.3, -0.2, 2.5])
+OVER_PILE = np.array([0.0, 0.0, 4.0])
+
+
+class SoilStandIn:
+    """Lets a test say what lies in the bucket and where loose parcels are."""
+
+    def __init__(self):
+        self.payload_mass_kg = 0.0
+        self.parcel_positions_w = np.zeros((0, 3))
+        self.parcel_is_load = np.zeros(0, dtype=bool)
+
+
+class WorksiteStandIn:
+    """A machine at rest over the pile, and soil and box as a test wants them."""
+
+    def __init__(self, worksite):
+        self.machine, self.tool = worksite.machine, worksite.tool
+        self.soil, self.box_mass_kg = SoilStandIn(), 0.0
+
+
+@pytest.fixture(scope="module")
+def real_worksite():
+    worksite = Worksite()
+    worksite.reset(draw_scene("train", 0))
+    return worksite
+
+
+@pytest.fixture
+def site(real_worksite):
+    return WorksiteStandIn(real_worksite)
+
+
+@pytest.fixture
+def cycle(site):
+    """A cycle whose bucket has just been emptied into the box."""
+    cycle = DigCycle(site, draw_scene("train", 0), target_id=0)
+    site.soil.payload_mass_kg = 300.0
+    cycle.update()
+    site.soil.payload_mass_kg, site.box_mass_kg = 5.0, 295.0
+    return cycle
+
+
+def play(cycle, ticks):
+    for _ in range(ticks):
+        cycle.update()
+    return cycle.is_complete
+
+
+def test_a_cycle_is_complete_once_the_bucket_has_stayed_empty(cycle):
+    assert not play(cycle, SETTLING_TICKS - 1)
+    assert play(cycle, 1)
+
+
+def test_soil_that_still_falls_into_the_box_is_waited_for(cycle, site):
+    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_BOX[None], np.array([False])
+    assert not play(cycle, 2 * SETTLING_TICKS)
+    site.soil.parcel_positions_w, site.soil.parcel_is_load = np.zeros((0, 3)), np.zeros(0, dtype=bool)
+    assert play(cycle, SETTLING_TICKS)
+
+
+def test_soil_that_keeps_moving_elsewhere_is_not_waited_for(cycle, site):
+    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_PILE[None], np.array([False])
+    assert play(cycle, SETTLING_TICKS)
+
+
+def test_what_sticks_in_the_bucket_over_the_box_is_not_waited_for(cycle, site):
+    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_BOX[None], np.array([True])
+    assert play(cycle, SETTLING_TICKS)
+
+
+def test_a_bucket_that_loads_again_is_not_empty(cycle, site):
+    play(cycle, SETTLING_TICKS - 1)
+    site.soil.payload_mass_kg = 50.0
+    assert not play(cycle, 1)
+    site.soil.payload_mass_kg = 0.0
+    assert not play(cycle, SETTLING_TICKS - 1)
+
+
+def test_the_cycle_reads_the_real_soil(real_worksite):
+    cycle = DigCycle(real_worksite, draw_scene("train", 0), target_id=0)
+    real_worksite.reset(draw_scene("train", 0))
+    assert not cycle._soil_moves_over_box()
+    real_worksite.soil.add_parcels(OVER_PILE[None], np.zeros((1, 3)))
+    assert not cycle._soil_moves_over_box()
+    real_worksite.soil.add_parcels(OVER_BOX[None], np.zeros((1, 3)))
+    assert cycle._soil_moves_over_box()
+    real_worksite.reset(draw_scene("train", 0))

@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.tasks.scoop.scene import cell_centres_w
+from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets, target_mask_img
+
+coordinate = st.floats(-3.0, 3.0)
+
+
+@given(coordinate, coordinate, st.floats(-np.pi, np.pi), st.floats(-0.39, 0.39), st.floats(-0.39, 0.39))
+def test_patch_contains_exactly_its_own_square(x, y, yaw, along, across):
+    target = Target(center_w=np.array([x, y, 0.5]), yaw_rad=yaw)
+    forward, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    inside = np.array([x, y]) + along * forward + across * left
+    assert target.contains(inside)
+    assert not target.contains(inside + 0.82 * forward)
+    assert not target.contains(inside - 0.82 * left)
+
+
+def test_height_does_not_matter_for_the_patch():
+    target = Target(center_w=np.zeros(3), yaw_rad=0.3)
+    assert target.contains(np.array([[0.1, 0.1, -2.0], [0.1, 0.1, 5.0]])).all()
+
+
+def test_mask_is_white_where_the_surface_point_is_in_the_patch():
+    points_w = np.full((4, 5, 3), np.nan)
+    points_w[1, 2] = [0.2, -0.1, 0.6]
+    points_w[2, 2] = [1.2, -0.1, 0.6]
+    mask = target_mask_img(Target(center_w=np.zeros(3), yaw_rad=0.0), points_w)
+    assert mask.shape == (4, 5, 3)
+    assert mask.dtype == np.uint8
+    assert np.argwhere(mask[..., 0] == 255).tolist() == [[1, 2]]
+    assert set(np.unique(mask)) == {0, 255}
+
+
+def test_flat_ground_offers_no_target():
+    x_w, y_w = cell_centres_w()
+    with pytest.raises(TooFewTargetsError, match="no room for 4 dig regions"):
+        find_targets(np.zeros((x_w.size, y_w.size)), x_w, y_w, np.random.default_rng(0))

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.soil import Tool
+from lerobot_excav.envs.tasks.scoop.targets import Target
+from lerobot_excav.envs.tasks.scoop.task_state import (
+    TASK_STATE_NAMES,
+    TaskMeter,
+    TaskState,
+    depth_below_dig_plane_m,
+    distance_to_box_m,
+)
+
+TARGET = Target(center_w=np.array([0.0, 0.0, 0.5]), yaw_rad=0.0)
+
+
+class WorksiteStandIn:
+    """Lets a test say what the bucket, the box and the contact sensor read."""
+
+    def __init__(self, edge_pos_w=(0.0, 0.0, 2.0)):
+        self.box_mass_kg = 0.0
+        self.machine = type(
+            "Machine", (), {"cutting_edge_pos_w": np.array(edge_pos_w), "box_contact_force_n": 0.0}
+        )()
+        self.soil = type("Soil", (), {"payload_mass_kg": 0.0})()
+        self.tool = tool_at(np.array([0.0, 0.0, 3.0]))
+
+
+def tool_at(position_w):
+    return Tool(
+        geometry=bucket_geometry(),
+        position_w=position_w,
+        rotation_w=np.eye(3),
+        linear_velocity_w=np.zeros(3),
+        angular_velocity_w=np.zeros(3),
+    )
+
+
+def meter_and_site(**kwargs):
+    site = WorksiteStandIn(**kwargs)
+    return TaskMeter(site, TARGET), site
+
+
+def test_array_follows_the_published_names():
+    state = TaskState(**{name: i for i, name in enumerate(TASK_STATE_NAMES)})
+    assert state.as_array().tolist() == list(range(8))
+    assert state.as_array().dtype == np.float32
+
+
+def test_excavated_mass_counts_soil_that_enters_again_twice():
+    meter, site = meter_and_site()
+    for payload_kg in (30.0, 10.0, 30.0):
+        site.soil.payload_mass_kg = payload_kg
+        meter.update()
+    assert meter.state.excavated_mass_kg == 50.0
+
+
+def test_deposited_mass_starts_at_the_box_as_it_was():
+    site = WorksiteStandIn()
+    site.box_mass_kg = 300.0
+    meter = TaskMeter(site, TARGET)
+    site.box_mass_kg = 340.0
+    assert meter.update().deposited_mass_kg == 40.0
+
+
+def test_one_touch_counts_once_however_long_and_only_when_hard():
+    meter, site = meter_and_site()
+    for force_n in (0.0, 4000.0, 6000.0, 9000.0, 100.0, 7000.0, 0.0, 8000.0):
+        site.machine.box_contact_force_n = force_n
+        meter.update()
+    assert meter.state.hard_target_contacts == 2
+
+
+@pytest.mark.parametrize(
+    ("edge_pos_w", "payloads_kg", "box_gain_kg", "events"),
+    [
+        ((0.0, 0.0, 2.0), (400.0, 390.0), 0.0, 1),
+        ((0.0, 0.0, 2.0), (400.0, 396.0), 0.0, 0),
+        ((0.0, 0.0, 2.0), (45.0, 30.0), 0.0, 0),
+        ((0.0, 0.0, 2.0), (400.0, 390.0), 3.0, 0),
+        ((*TARGET_BOX.center_w[:2], 2.0), (400.0, 300.0), 0.0, 0),
+    ],
+    ids=["lost on the way", "trickle", "nearly empty", "reaches the box", "still falling into the box"],
+)
+def test_spill_is_a_loss_from_a_loaded_bucket_away_from_the_box(edge_pos_w, payloads_kg, box_gain_kg, events):
+    meter, site = meter_and_site(edge_pos_w=edge_pos_w)
+    site.soil.payload_mass_kg = payloads_kg[0]
+    meter.update()
+    site.soil.payload_mass_kg, site.box_mass_kg = payloads_kg[1], box_gain_kg
+    assert meter.update().spill_before_target_events == events
+
+
+def test_distance_to_the_target_is_taken_from_the_cutting_edge():
+    meter, _ = meter_and_site(edge_pos_w=(3.0, 4.0, 0.5))
+    assert meter.state.distance_to_target_m == pytest.approx(5.0)
+
+
+@given(st.floats(-8, 8), st.floats(-8, 8), st.floats(0, 6))
+def test_distance_to_the_box_is_zero_inside_and_grows_with_height_above_it(x, y, z):
+    cx, cy, _ = TARGET_BOX.center_w
+    inside = abs(x - cx) <= TARGET_BOX.half_extent_m[0] and abs(y - cy) <= TARGET_BOX.half_extent_m[1]
+    distance = distance_to_box_m(np.array([x, y, z]))
+    assert (distance == 0.0) == (inside and z <= TARGET_BOX.wall_height_m)
+    assert distance_to_box_m(np.array([x, y, z + 7.0])) >= 5.9
+
+
+def test_depth_is_measured_inside_the_dig_area_only():
+    low = np.array([0.0, 0.0, -0.3])
+    assert depth_below_dig_plane_m(tool_at(low)) == pytest.approx(0.3)
+    assert depth_below_dig_plane_m(tool_at(np.array([0.0, 0.0, 0.2]))) == 0.0
+    outside = np.array([DIG_AREA_EXTENT_M[0], 0.0, -0.3])
+    assert depth_below_dig_plane_m(tool_at(outside)) == 0.0
