@@ -3,10 +3,13 @@
 A package of one's own adds a task with `register_task`; environments, recordings, checks and reports then have it.
 """
 
+from importlib.metadata import entry_points
+
 import gymnasium as gym
 
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.envs.tasks.setting import declared_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError, require, require_choice
@@ -25,6 +28,12 @@ def register_task(spec: TaskSpec) -> None:
     require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
     # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
     gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
+
+
+def load_outside_tasks() -> None:
+    """Import what installed packages name as entry points of the group `lerobot_excav.tasks`; each registers its tasks."""
+    for entry_point in entry_points(group="lerobot_excav.tasks"):
+        entry_point.load()
 
 
 def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:
@@ -52,9 +61,18 @@ def task_of_settings(settings: TaskSettings) -> TaskSpec:
     return task_spec(f"{settings.PREFIX}task", settings.task, env_type=settings.ENV_TYPE)
 
 
+def task_settings(config: TaskSettings) -> TaskSettings:
+    """Return the settings alone of a configuration of LeRobot that is made of them."""
+    kind = task_of_settings(config).settings
+    return kind(**{name: getattr(config, name) for name in declared_settings(kind)})
+
+
 def env_types() -> dict[str, TaskSpec]:
     """Return the environments by `--env.type`, each with its first task."""
-    return {spec.env_type: spec for spec in reversed(TASKS.values())}
+    types: dict[str, TaskSpec] = {}
+    for spec in TASKS.values():
+        types.setdefault(spec.env_type, spec)
+    return types
 
 
 def task_of_robot(robot_type: str | None) -> TaskSpec:

@@ -10,13 +10,14 @@ import typing
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from numbers import Integral
+from pathlib import Path
 from types import NoneType
 from typing import Any
 
 from lerobot_excav.errors import ConfigurationError
 
 _METADATA_KEY = "setting"
-_KIND_NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
+_KIND_NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false", Path: "a path"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +54,7 @@ class Allowed:
         if self.values is not None:
             return "one of " + ", ".join(map(str, self.values))
         if self.low is not None:
-            return f"{self.low} or more" if self.high is None else f"{self.low} to {self.high}"
+            return f"from {self.low} on" if self.high is None else f"from {self.low} to {self.high}"
         return ""
 
 
@@ -68,10 +69,10 @@ def setting(meaning: str, *, default: Any, **allowed: Any) -> Any:
     limits = Allowed(**allowed)
     text = ". ".join(part for part in (meaning, limits.words and f"Allowed: {limits.words}") if part)
     # argparse formats help texts with the percent operator.
-    help_text = text.replace("%", "%%")
-    return field(
-        default=default, metadata={_METADATA_KEY: limits, "custom_args": {"help": help_text}}, kw_only=True
-    )
+    custom_args: dict[str, Any] = {"help": text.replace("%", "%%")}
+    if isinstance(default, bool):
+        custom_args |= {"nargs": "?", "const": "true"}  # `--resume` means `--resume=true`
+    return field(default=default, metadata={_METADATA_KEY: limits, "custom_args": custom_args}, kw_only=True)
 
 
 def with_default(cls: type, name: str, default: Any) -> Any:
@@ -105,14 +106,11 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
     kinds = typing.get_args(kind) or (kind,)
     if (value is None and NoneType in kinds) or (allowed.also and isinstance(value, allowed.also)):
         return
-    if not any(_is_of(value, each) for each in kinds):
-        wanted = allowed.words or " or ".join(
-            _KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType
-        )
-        raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted}. {allowed.hint}".rstrip())
-    if isinstance(value, str | int | float) and not _is_allowed(value, allowed):
+    if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
+        names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
+        wanted = allowed.words if allowed.values is not None else f"{' or '.join(names)} {allowed.words}"
         raise ConfigurationError(
-            f"{name}={value!r} is not possible; give {allowed.words}. {allowed.hint}".rstrip()
+            f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip()
         )
 
 
@@ -124,12 +122,14 @@ def _is_of(value: Any, kind: Any) -> bool:
         return isinstance(value, Integral)
     if kind is float:
         return isinstance(value, int | float) and math.isfinite(value)
-    if isinstance(kind, type):
-        return isinstance(value, kind)
-    return True
+    if kind is Path:
+        return isinstance(value, str | Path)
+    return isinstance(value, kind) if isinstance(kind, type) else True
 
 
 def _is_allowed(value: Any, allowed: Allowed) -> bool:
     if allowed.values is not None:
         return value in allowed.values
+    if not isinstance(value, int | float):
+        return True
     return (allowed.low is None or value >= allowed.low) and (allowed.high is None or value <= allowed.high)

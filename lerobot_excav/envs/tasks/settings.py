@@ -65,6 +65,9 @@ class TaskSettings:
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
         self._check_mask()
+        # A configuration of LeRobot stands behind the settings.
+        if hasattr(super(), "__post_init__"):
+            super().__post_init__()
 
     def _check_mask(self) -> None:
         """Raise unless condition, kind and size of the mask's noise belong together."""
@@ -85,6 +88,18 @@ class TaskSettings:
         """Height and width of every picture [px]."""
         return self.observation_height, self.observation_width
 
+    @property
+    def mask_words(self) -> str:
+        """What the mask shows, in words; datasets keep it as `excav.mask_source`."""
+        words = [self.mask_source]
+        if self.mask_condition != "correct":
+            words.append(self.mask_condition)
+        if self.mask_noise != "none":
+            words.append(f"{self.mask_noise} {self.mask_noise_px} px")
+        if self.target_overlay:
+            words.append("as overlay")
+        return ", ".join(words)
+
     @classmethod
     def columns(cls) -> tuple[str, ...]:
         """Return the names of the settings that datasets keep in every frame, as `excav.<name>`."""
@@ -96,7 +111,7 @@ class TaskSettings:
         return tuple(name for name, allowed in declared_settings(cls).items() if allowed.changes_start)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the settings by name, without what a configuration of LeRobot adds to them."""
+        """Return the settings by name."""
         return {name: getattr(self, name) for name in declared_settings(type(self))}
 
     @classmethod
@@ -117,6 +132,3 @@ class TaskSettings:
                     f"{place}{name} is not a setting of {cls.ENV_TYPE}; allowed: {', '.join(known)}"
                 )
         return cls(**values)
-
-    def __hash__(self) -> int:
-        return hash(tuple(self.as_dict().values()))
