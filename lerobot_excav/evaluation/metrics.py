@@ -1,22 +1,15 @@
 """What was measured in an evaluation: one line of JSON per episode, as `--env.metrics_path` writes it."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import NamedTuple
 
-from lerobot_excav.datasets.format.json_lines import Line, read_json_lines
-from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.episode import Episode, EpisodeKey
-from lerobot_excav.evaluation.grasp_table import GRASP
-from lerobot_excav.evaluation.scoop_table import SCOOP
-from lerobot_excav.evaluation.task_table import TaskTable
+from pydantic import BaseModel, ConfigDict
 
-TASK_TABLES = {table.task: table for table in (SCOOP, GRASP)}
-"""Every task that reports are made of."""
-
-UNMARKED_TASK = SCOOP.task
-"""The task of the files that were written when there was one only."""
+from lerobot_excav.envs.tasks.measures import EpisodeKey, EpisodeRecord, TaskMeasures
+from lerobot_excav.envs.tasks.registry import task_spec
+from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.evaluation.validated import validated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +18,8 @@ class Evaluation:
 
     Attributes:
         path: The file.
-        table: What reports know of its task.
+        task: Its task.
+        measures: What is measured of the task.
         of: How many evaluations the file holds; LeRobot appends one after the other, and this is the last.
         operator: Who played, if the file says so: `scripted`, `human`, or None for a policy.
         seed: Seed of the first episode; LeRobot's `--seed`. None if the file does not say.
@@ -33,11 +27,29 @@ class Evaluation:
     """
 
     path: Path
-    table: TaskTable
+    task: str
+    measures: TaskMeasures
     of: int
     operator: str | None
     seed: int | None
-    episodes: dict[EpisodeKey, Episode]
+    episodes: dict[EpisodeKey, EpisodeRecord]
+
+
+class _LineHead(BaseModel):
+    """The entries of a line that are not the outcome of the episode."""
+
+    model_config = ConfigDict(strict=True)
+
+    task: str
+    episode_ix: int | None = None
+    operator: str | None = None
+    seed: int | None = None
+
+
+class _Line(NamedTuple):
+    place: str
+    text: str
+    head: _LineHead
 
 
 def read_evaluation(path: Path) -> Evaluation:
@@ -51,75 +63,60 @@ def read_evaluation(path: Path) -> Evaluation:
             or tasks are mixed, or an episode occurs twice.
     """
     path = path / "metrics.jsonl" if path.is_dir() else path
-    lines = read_json_lines(path, origin=f"lerobot-eval writes it with --env.metrics_path={path}")
-    if not lines:
-        raise DatasetError(f"{path} is empty: no episode was finished")
-    evaluations = _evaluations(lines)
+    evaluations = _cut(_lines(path))
     last = evaluations[-1]
-    table = _table(last)
+    head = last[0].head
+    measures = _measures(last)
     return Evaluation(
         path=path,
-        table=table,
+        task=head.task,
+        measures=measures,
         of=len(evaluations),
-        operator=last[0].record.get("operator"),
-        seed=last[0].record.get("seed"),
-        episodes=_by_key(last, table),
+        operator=head.operator,
+        seed=head.seed,
+        episodes=_by_key(last, measures),
     )
 
 
-def _evaluations(lines: list[Line]) -> list[list[Line]]:
-    """Cut a file where LeRobot began to count anew."""
-    starts = [i for i, line in enumerate(lines) if i == 0 or line.record.get("episode_ix") == 0]
+def _lines(path: Path) -> list[_Line]:
+    try:
+        texts = path.read_text().splitlines()
+    except FileNotFoundError:
+        raise DatasetError(
+            f"{path} does not exist; lerobot-eval writes it with --env.metrics_path={path}"
+        ) from None
+    places = [(f"{path}:{number}", text) for number, text in enumerate(texts, 1) if text.strip()]
+    if not places:
+        raise DatasetError(f"{path} is empty: no episode was finished")
+    return [_Line(place, text, validated(_LineHead, text, place)) for place, text in places]
+
+
+def _cut(lines: list[_Line]) -> list[list[_Line]]:
+    """Cut a file where LeRobot began to count from 0 again."""
+    starts = [i for i, line in enumerate(lines) if i == 0 or line.head.episode_ix == 0]
     return [lines[a:b] for a, b in zip(starts, [*starts[1:], len(lines)], strict=True)]
 
 
-def _table(lines: list[Line]) -> TaskTable:
-    first = lines[0].record.get("task", UNMARKED_TASK)
+def _measures(lines: list[_Line]) -> TaskMeasures:
+    first = lines[0]
     for line in lines:
-        task = line.record.get("task", UNMARKED_TASK)
-        if task not in TASK_TABLES:
+        if line.head.task != first.head.task:
             raise DatasetError(
-                f"{line.place}: task={task!r}; reports are made of {', '.join(TASK_TABLES)} only"
+                f"{line.place}: task={line.head.task!r}, but the lines before are of {first.head.task!r}"
             )
-        if task != first:
-            raise DatasetError(f"{line.place}: task={task!r}, but the lines before are of {first!r}")
-    return TASK_TABLES[first]
+    try:
+        return task_spec(f"{first.place}: task", first.head.task).measures
+    except ConfigurationError as error:
+        raise DatasetError(str(error)) from error
 
 
-def _by_key(lines: Iterable[Line], table: TaskTable) -> dict[EpisodeKey, Episode]:
-    episodes: dict[EpisodeKey, Episode] = {}
+def _by_key(lines: list[_Line], measures: TaskMeasures) -> dict[EpisodeKey, EpisodeRecord]:
+    episodes: dict[EpisodeKey, EpisodeRecord] = {}
     for line in lines:
-        episode = _episode(line, table)
+        episode = validated(measures.record, line.text, line.place)
         if episode.key in episodes:
             raise DatasetError(
                 f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?"
             )
         episodes[episode.key] = episode
     return episodes
-
-
-def _episode(line: Line, table: TaskTable) -> Episode:
-    record = table.episode.completed(line.record)
-    values: dict[str, Any] = {}
-    for field in fields(table.episode):
-        if field.name not in record:
-            raise DatasetError(f"{line.place}: lacks {field.name}; was it written by --env.metrics_path?")
-        values[field.name] = _typed(record[field.name], field.type, f"{line.place}: {field.name}")
-    return table.episode(**values)
-
-
-def _typed(value: Any, kind: Any, place: str) -> Any:
-    """Check a JSON value against a type; whole numbers are numbers, but truth values are not."""
-    if kinds := get_args(kind):  # `int | None`
-        kind = kinds[0]
-        if value is None:
-            return None
-    fits = {
-        bool: isinstance(value, bool),
-        str: isinstance(value, str),
-        int: isinstance(value, int) and not isinstance(value, bool),
-        float: isinstance(value, int | float) and not isinstance(value, bool),
-    }[kind]
-    if not fits:
-        raise DatasetError(f"{place}={value!r} is no {kind.__name__}")
-    return kind(value)

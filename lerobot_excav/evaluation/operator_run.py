@@ -11,6 +11,7 @@ from lerobot_excav.datasets.record.rig import Rig
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
+from lerobot_excav.envs.configs.provenance import write_provenance
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
@@ -44,7 +45,9 @@ def evaluate_operator(
         raise DatasetError(f"--metrics={path} exists; choose another file, or remove it first")
     partial = path.with_name(f"{path.name}.partial")
     if partial.exists() and not resume:
-        raise DatasetError(f"{partial} is an interrupted run; continue it with --resume, or remove the file")
+        raise DatasetError(
+            f"{partial} is an interrupted run; continue it with --resume=true, or remove the file"
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     pairs = settings.pairs()
     lines = _finished_lines(partial, settings, pairs)
@@ -60,6 +63,7 @@ def evaluate_operator(
         show=show_progress,
     )
     partial.rename(path)
+    write_provenance(path)
 
 
 def _play_rest(

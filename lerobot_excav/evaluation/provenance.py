@@ -1,51 +1,57 @@
-"""Where an evaluation comes from: its command and code, and the training of its policy.
+"""Where an evaluation comes from: its command, its code, and the training of its policy.
 
-The record of its stage lies beside the metrics file, or beside their folder, as a JSON file of the same name. Copies of
-metrics files keep theirs. The training is that of the record; records of earlier versions have none, and the training
-is looked up where their command found the policy.
+`X.json` beside `X.jsonl` says so; what writes metrics writes it (`envs.configs.provenance`). Copies on a result page hold
+the training as well. Otherwise it is read where the command found the policy.
 """
 
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Self
 
-from lerobot_excav.evaluation.experiment.stage_record import StageRecord, read_json, record_from, record_path
-from lerobot_excav.evaluation.training import Training, evaluated_training, training_from
+from pydantic import BaseModel, ConfigDict
+
+from lerobot_excav.evaluation.training import TrainingFacts, read_training
+from lerobot_excav.evaluation.validated import validated
 
 
-@dataclass(frozen=True, kw_only=True)
-class Provenance:
-    """Command and code of an evaluation, and the training of its policy.
+class EvaluationOrigin(BaseModel):
+    """Command and code of an evaluation, and the training of its policy; None where nothing tells.
 
     Attributes:
-        record: What was run; None if the evaluation was run by hand.
-        training: How the policy was trained; None if its checkpoint is unknown or gone.
+        command: Command, for a shell.
+        commit: Commit of this repository.
+        modified: Whether the package differed from that commit.
+        packages: Versions by distribution.
+        started: When the command began (UTC).
+        seconds: How long it ran [s].
+        policy: Folder of the checkpoint that played.
+        training: How that checkpoint was trained.
     """
 
-    record: StageRecord | None = None
-    training: Training | None = None
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the record's entries, with those of the training in `training`."""
-        record = asdict(self.record) if self.record else {}
-        return {**record, "training": self.training.as_dict() if self.training else None}
+    command: str | None
+    commit: str | None = None
+    modified: bool = False
+    packages: dict[str, str] = {}
+    started: str | None = None
+    seconds: float | None = None
+    policy: str | None = None
+    training: TrainingFacts | None = None
 
+    @classmethod
+    def read(cls, metrics: Path) -> Self:
+        """Read where an evaluation comes from.
 
-def read_provenance(metrics: Path) -> Provenance:
-    """Read where an evaluation comes from.
+        Args:
+            metrics: Its metrics file.
 
-    Args:
-        metrics: Its metrics file.
-
-    Raises:
-        DatasetError: What lies in the place of the record is none, or its training is not one.
-    """
-    path = record_path(metrics.parent) if metrics.stem == "metrics" else metrics.with_suffix(".json")
-    if not path.is_file():
-        return Provenance()
-    content = read_json(path)
-    training = content.pop("training", None)
-    record = record_from(content, path) if content else None
-    if training is not None:
-        return Provenance(record=record, training=training_from(training, path))
-    return Provenance(record=record, training=evaluated_training(record.command) if record else None)
+        Raises:
+            DatasetError: What lies in the place of the record is not one.
+        """
+        path = metrics.with_suffix(".json")
+        if not path.is_file():
+            return cls(command=None)
+        origin = validated(cls, path.read_text(), str(path))
+        if origin.training is None and origin.policy is not None:
+            return origin.model_copy(update={"training": read_training(Path(origin.policy))})
+        return origin

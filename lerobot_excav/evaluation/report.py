@@ -73,17 +73,13 @@ def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) 
             for run in runs[1:]
             if not unlike[run.label]
         },
-        operator=_who(operator) if operator else None,
+        operator=(operator.evaluations[0].operator or "not stated") if operator else None,
         bootstrap_seed=seed,
         notes=[
             *(note for run in rows for note in file_notes(run)),
             *(f"no paired differences to {label}: {reason}" for label, reason in unlike.items() if reason),
         ],
     )
-
-
-def _who(operator: Run) -> str:
-    return operator.evaluations[0].operator or "not stated"
 
 
 def file_notes(run: Run) -> list[str]:

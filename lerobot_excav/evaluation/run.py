@@ -4,10 +4,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
+from lerobot_excav.envs.tasks.measures import EpisodeKey, EpisodeRecord, TaskMeasures
 from lerobot_excav.errors import require
-from lerobot_excav.evaluation.episode import Episode, EpisodeKey
 from lerobot_excav.evaluation.metrics import Evaluation
-from lerobot_excav.evaluation.task_table import TaskTable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,6 +16,9 @@ class Run:
     Attributes:
         label: Name in the report.
         evaluations: One per training seed.
+
+    Raises:
+        ConfigurationError: The evaluations show different scenes, or the episodes were not played alike.
     """
 
     label: str
@@ -26,35 +28,41 @@ class Run:
         first = self.evaluations[0]
         for evaluation in self.evaluations[1:]:
             require(
-                evaluation.table is first.table and set(evaluation.episodes) == set(first.episodes),
+                evaluation.task == first.task and set(evaluation.episodes) == set(first.episodes),
                 f"{self.label}: {evaluation.path} shows other scenes or targets than {first.path}; "
                 "evaluate every seed with the same --seed and --eval.n_episodes",
             )
-        names = list(self.table.constants.values())
-        conditions = {self._constants(episode) for episode in self.episodes}
-        require(
-            len(conditions) == 1,
-            f"{self.label} mixes {', '.join(names[:-1])} or {names[-1]}: {sorted(map(str, conditions))}; "
-            "give each a file of its own",
-        )
-
-    def _constants(self, episode: Episode) -> tuple[Any, ...]:
-        return tuple(getattr(episode, name) for name in self.table.constants)
+        for name, plural in self.measures.constants.items():
+            found = sorted({str(getattr(episode, name)) for episode in self.episodes})
+            require(
+                len(found) == 1,
+                f"{self.label} mixes {plural}: {' and '.join(found)}; give each a file of its own",
+            )
 
     @property
-    def table(self) -> TaskTable:
-        """What reports know of the task."""
-        return self.evaluations[0].table
+    def task(self) -> str:
+        """Its task."""
+        return self.evaluations[0].task
+
+    @property
+    def measures(self) -> TaskMeasures:
+        """What is measured of the task."""
+        return self.evaluations[0].measures
 
     @property
     def constants(self) -> dict[str, Any]:
         """What all episodes share, by name."""
-        return dict(zip(self.table.constants, self._constants(self.episodes[0]), strict=True))
+        return {name: getattr(self.episodes[0], name) for name in self.measures.constants}
 
     @property
     def world(self) -> str:
         """What a scene's number depends on, in words."""
-        return self.table.world.format(**self.constants)
+        return self.measures.world.format(**self.constants)
+
+    @property
+    def setting(self) -> dict[str, str]:
+        """What tells the run apart, by header."""
+        return {header: self._words(field) for header, field in self.measures.setting.items()}
 
     @property
     def keys(self) -> list[EpisodeKey]:
@@ -62,7 +70,7 @@ class Run:
         return sorted(self.evaluations[0].episodes)
 
     @property
-    def episodes(self) -> list[Episode]:
+    def episodes(self) -> list[EpisodeRecord]:
         """All episodes, evaluation by evaluation, each in the order of `keys`."""
         return [evaluation.episodes[key] for evaluation in self.evaluations for key in self.keys]
 
@@ -73,3 +81,9 @@ class Run:
             for evaluation in self.evaluations
         )
         return Run(label=self.label, evaluations=tuple(parts))
+
+    def _words(self, field: str) -> str:
+        """Return what all episodes say; where they differ, as in the frames of their commands, the first with that."""
+        found = dict.fromkeys(str(getattr(episode, field)) for episode in self.episodes)
+        first, *others = found
+        return first if not others else f"{first} (and {len(others)} others)"

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
 from lerobot_excav.evaluation.comparison import matched, means_by_key
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
-from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,8 @@ class RunSummary:
 
     Attributes:
         label: Name of the run.
-        table: What reports know of its task.
+        task: Its task.
+        measures: What is measured of the task.
         episodes: Number of episodes, over all seeds.
         seeds: Number of evaluations, one per training seed.
         scenes: Number of scenes and targets.
@@ -43,7 +44,8 @@ class RunSummary:
     """
 
     label: str
-    table: TaskTable
+    task: str
+    measures: TaskMeasures
     episodes: int
     seeds: int
     scenes: int
@@ -61,7 +63,7 @@ class RunSummary:
         values = {
             key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()
         }
-        return {"label": self.label, "task": self.table.task, **counts, **self.constants, **values}
+        return {"label": self.label, "task": self.task, **counts, **self.constants, **values}
 
 
 def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSummary:
@@ -75,16 +77,16 @@ def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSu
     Raises:
         DatasetError: The operator's run lacks scenes and targets, or played another world.
     """
-    first = run.episodes[0]
     return RunSummary(
         label=run.label,
-        table=run.table,
+        task=run.task,
+        measures=run.measures,
         episodes=len(run.episodes),
         seeds=len(run.evaluations),
         scenes=len(run.keys),
         constants=run.constants,
-        setting={header: str(getattr(first, field)) for header, field in run.table.setting.items()},
-        values={column.key: _value(column, run, operator, rng) for column in run.table.columns},
+        setting=run.setting,
+        values={column.key: _value(column, run, operator, rng) for column in run.measures.columns},
     )
 
 

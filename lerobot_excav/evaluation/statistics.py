@@ -1,12 +1,13 @@
 """Intervals and tests for rates and means of few episodes."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from lerobot_excav.errors import require
 
@@ -45,21 +46,14 @@ def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -
     """
     require(n >= 1, f"n={n}: a proportion needs at least one episode")
     require(0 <= successes <= n, f"successes={successes} is out of range; allowed: 0 to n={n}")
-    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
     p = successes / n
-    shrink = 1.0 + z * z / n
-    center = (p + z * z / (2 * n)) / shrink
-    half = z / shrink * math.sqrt(p * (1.0 - p) / n + z * z / (4 * n * n))
+    ends = stats.binomtest(successes, n).proportion_ci(confidence, method="wilson")
     # The ends are exact at p = 0 and p = 1; rounding must not push them past it.
-    return Interval(estimate=p, low=min(p, max(0.0, center - half)), high=max(p, min(1.0, center + half)))
+    return Interval(estimate=p, low=min(p, float(ends.low)), high=max(p, float(ends.high)))
 
 
 def bootstrap_mean(
-    values: NDArray[Any],
-    rng: np.random.Generator,
-    *,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    values: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE
 ) -> Interval:
     """Estimate a mean with a percentile bootstrap interval.
 
@@ -67,15 +61,11 @@ def bootstrap_mean(
         values: Independent values, shape (n,).
         rng: Source of the resampling.
         confidence: Coverage, in (0, 1).
-        resamples: Number of resamples.
 
     Raises:
         ConfigurationError: No values.
     """
-    values = np.asarray(values, dtype=np.float64)
-    require(values.size >= 1, "a mean needs at least one episode")
-    means = values[_resample(values.size, rng, resamples)].mean(axis=1)
-    return _percentiles(float(values.mean()), means, confidence)
+    return _bootstrap(np.mean, (values,), rng, confidence)
 
 
 def bootstrap_ratio(
@@ -84,7 +74,6 @@ def bootstrap_ratio(
     rng: np.random.Generator,
     *,
     confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
 ) -> Interval:
     """Estimate the ratio of two means of paired values with a percentile bootstrap interval.
 
@@ -93,34 +82,17 @@ def bootstrap_ratio(
         denominator: Values of the same scenes, shape (n,).
         rng: Source of the resampling, which draws scenes.
         confidence: Coverage, in (0, 1).
-        resamples: Number of resamples.
 
     Raises:
         ConfigurationError: Different lengths, no values, or a denominator without a positive mean.
     """
-    numerator, denominator = (
-        np.asarray(numerator, dtype=np.float64),
-        np.asarray(denominator, dtype=np.float64),
-    )
-    require(
-        numerator.shape == denominator.shape,
-        f"a paired ratio needs as many values on both sides, not {numerator.size} and {denominator.size}",
-    )
-    require(denominator.size >= 1, "a ratio needs at least one episode")
-    require(float(denominator.mean()) > 0.0, "the operator's mean is zero, so nothing can be related to it")
-    rows = _resample(numerator.size, rng, resamples)
-    below = denominator[rows].mean(axis=1)
-    ratios = np.divide(numerator[rows].mean(axis=1), below, out=np.full(resamples, np.inf), where=below > 0.0)
-    return _percentiles(float(numerator.mean() / denominator.mean()), ratios, confidence)
+    _require_pairs(numerator, denominator)
+    require(float(np.mean(denominator)) > 0.0, "the operator's mean is zero, so nothing can be related to it")
+    return _bootstrap(_ratio_of_means, (numerator, denominator), rng, confidence)
 
 
 def paired_bootstrap(
-    first: NDArray[Any],
-    second: NDArray[Any],
-    rng: np.random.Generator,
-    *,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    first: NDArray[Any], second: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE
 ) -> Interval:
     """Estimate the mean difference `second - first` of paired values with a percentile bootstrap interval.
 
@@ -129,17 +101,12 @@ def paired_bootstrap(
         second: Values of the same scenes, shape (n,).
         rng: Source of the resampling, which draws scenes.
         confidence: Coverage, in (0, 1).
-        resamples: Number of resamples.
 
     Raises:
         ConfigurationError: Different lengths or no values.
     """
-    first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    require(
-        first.shape == second.shape,
-        f"a paired difference needs as many values on both sides, not {first.size} and {second.size}",
-    )
-    return bootstrap_mean(second - first, rng, confidence=confidence, resamples=resamples)
+    _require_pairs(first, second)
+    return bootstrap_mean(np.asarray(second, float) - np.asarray(first, float), rng, confidence=confidence)
 
 
 def newcombe_interval(both: int, first_only: int, second_only: int, neither: int) -> Interval:
@@ -197,16 +164,45 @@ def mcnemar_exact(first_only: int, second_only: int) -> float:
         p-value; 1 if they never differ.
     """
     require(first_only >= 0 and second_only >= 0, f"counts must not be negative: {first_only}, {second_only}")
-    n, k = first_only + second_only, min(first_only, second_only)
-    tail: float = sum(math.comb(n, i) for i in range(k + 1)) / 2**n
-    return min(1.0, 2.0 * tail)
+    n = first_only + second_only
+    return float(stats.binomtest(first_only, n).pvalue) if n else 1.0
 
 
-def _resample(n: int, rng: np.random.Generator, resamples: int) -> NDArray[Any]:
-    return rng.integers(0, n, size=(resamples, n))
+def _require_pairs(first: NDArray[Any], second: NDArray[Any]) -> None:
+    require(
+        np.shape(first) == np.shape(second),
+        f"paired values are as many on both sides, not {np.size(first)} and {np.size(second)}",
+    )
 
 
-def _percentiles(estimate: float, resampled: NDArray[Any], confidence: float) -> Interval:
-    tail = 50.0 * (1.0 - confidence)
-    low, high = np.percentile(resampled, [tail, 100.0 - tail])
-    return Interval(estimate=estimate, low=float(low), high=float(high))
+def _ratio_of_means(numerator: NDArray[Any], denominator: NDArray[Any], axis: int = -1) -> NDArray[Any]:
+    """Divide means; a resample without anything in the denominator counts as infinite."""
+    above, below = np.asarray(numerator.mean(axis=axis)), np.asarray(denominator.mean(axis=axis))
+    ratios = np.full(below.shape, np.inf)
+    np.divide(above, below, out=ratios, where=below > 0.0)
+    return ratios
+
+
+def _bootstrap(
+    statistic: Callable[..., Any],
+    samples: tuple[NDArray[Any], ...],
+    rng: np.random.Generator,
+    confidence: float,
+) -> Interval:
+    """Resample scenes, the same ones in every sample, and take the percentiles of the statistic."""
+    samples = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
+    require(samples[0].size >= 1, "a mean needs at least one episode")
+    estimate = float(statistic(*samples, axis=-1))
+    if samples[0].size == 1:  # every resample is the one scene
+        return Interval(estimate=estimate, low=estimate, high=estimate)
+    ends = stats.bootstrap(
+        samples,
+        statistic,
+        paired=True,
+        vectorized=True,
+        n_resamples=RESAMPLES,
+        confidence_level=confidence,
+        method="percentile",
+        rng=rng,
+    ).confidence_interval
+    return Interval(estimate=estimate, low=float(ends.low), high=float(ends.high))

@@ -1,22 +1,15 @@
 """How a checkpoint was trained, from the files that LeRobot keeps with it."""
 
-import json
 import math
-import re
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
 
-from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.experiment.stage_record import log_path, read_record
-from lerobot_excav.evaluation.training_log import training_minutes
+from pydantic import BaseModel, ConfigDict
 
-_POLICY_PATH = re.compile(r"--policy\.path[= ](\S+)")
+from lerobot_excav.evaluation.training_log import read_training_log
+from lerobot_excav.evaluation.validated import validated
 
 
-@dataclass(frozen=True, kw_only=True)
-class Training:
+class TrainingFacts(BaseModel):
     """Facts of a training up to one checkpoint; None where no file tells.
 
     Attributes:
@@ -31,6 +24,8 @@ class Training:
         command: Command of the training.
         commit: Commit of the code.
     """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str
     dataset: str
@@ -48,72 +43,71 @@ class Training:
         """Samples seen up to the checkpoint."""
         return None if self.steps is None else self.steps * self.batch_size
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields by name."""
-        return asdict(self)
+
+class _Dataset(BaseModel):
+    repo_id: str
+    root: str | None = None
+    episodes: list[int] | None = None
+    eval_split: float = 0.0
 
 
-def read_training(pretrained: Path) -> Training | None:
-    """Read how a checkpoint was trained.
+class _TrainConfig(BaseModel):
+    """What is needed of LeRobot's `train_config.json`."""
+
+    dataset: _Dataset
+    batch_size: int
+    seed: int | None = None
+
+
+class _Step(BaseModel):
+    step: int
+
+
+class _DatasetInfo(BaseModel):
+    total_episodes: int
+
+
+def read_training(pretrained: Path) -> TrainingFacts | None:
+    """Read how a checkpoint was trained; its log lies beside the training's folder, as `TRAINING.log`.
 
     Args:
         pretrained: Its folder `TRAINING/checkpoints/STEP/pretrained_model`.
 
     Returns:
-        None if the folder is no checkpoint of `lerobot-train`, or is gone.
+        None if the folder is not a checkpoint of `lerobot-train`, or is gone.
+
+    Raises:
+        DatasetError: A file of the checkpoint is damaged.
     """
-    config_path = pretrained / "train_config.json"
-    if not config_path.is_file():
+    config = _read(_TrainConfig, pretrained / "train_config.json")
+    if config is None:
         return None
-    config = json.loads(config_path.read_text())
     folder = pretrained.absolute().parents[2]
-    record = read_record(folder)
-    steps = _steps(pretrained.parent)
-    demonstrations = _demonstrations(config["dataset"])
-    return Training(
+    log = read_training_log(folder.with_name(f"{folder.name}.log"))
+    step = _read(_Step, pretrained.parent / "training_state" / "training_step.json")
+    demonstrations = _demonstrations(config.dataset)
+    return TrainingFacts(
         name=folder.name,
-        dataset=Path(config["dataset"]["root"] or config["dataset"]["repo_id"]).name,
+        dataset=Path(config.dataset.root or config.dataset.repo_id).name,
         demonstrations=demonstrations,
         # As LeRobot rounds.
-        held_out=math.ceil((demonstrations or 0) * config["dataset"].get("eval_split", 0.0)),
-        steps=steps,
-        batch_size=config["batch_size"],
-        seed=config["seed"],
-        minutes=None if steps is None else training_minutes(log_path(folder)).get(steps),
-        command=record.command if record else None,
-        commit=record.commit if record else None,
+        held_out=math.ceil((demonstrations or 0) * config.dataset.eval_split),
+        steps=step.step if step else None,
+        batch_size=config.batch_size,
+        seed=config.seed,
+        minutes=log.minutes.get(step.step) if step else None,
+        command=log.command,
+        commit=log.commit,
     )
 
 
-def evaluated_training(command: str) -> Training | None:
-    """Read how the policy of an evaluation is trained by now; None if the command names no checkpoint that is there."""
-    found = _POLICY_PATH.search(command)
-    return read_training(Path(found[1])) if found else None
+def _read[Model: BaseModel](model: type[Model], path: Path) -> Model | None:
+    return validated(model, path.read_text(), str(path)) if path.is_file() else None
 
 
-def training_from(content: Mapping[str, Any], path: Path) -> Training:
-    """Make a training of its entries in a file.
-
-    Raises:
-        DatasetError: They are others.
-    """
-    unlike = sorted(set(content) ^ {entry.name for entry in fields(Training)})
-    if unlike:
-        raise DatasetError(
-            f"{path}: its `training` has other entries than this version knows: {', '.join(unlike)}; "
-            "remove `training` from the file, or make it again with this version"
-        )
-    return Training(**content)
-
-
-def _steps(checkpoint: Path) -> int | None:
-    path = checkpoint / "training_state" / "training_step.json"
-    return int(json.loads(path.read_text())["step"]) if path.is_file() else None
-
-
-def _demonstrations(dataset: dict[str, Any]) -> int | None:
+def _demonstrations(dataset: _Dataset) -> int | None:
     """Count the episodes of a training: those it names, or all of its dataset."""
-    if dataset.get("episodes") is not None:
-        return len(dataset["episodes"])
-    path = Path(dataset["root"] or "") / "meta" / "info.json"
-    return int(json.loads(path.read_text())["total_episodes"]) if path.is_file() else None
+    if dataset.episodes is not None:
+        return len(dataset.episodes)
+    info = _read(_DatasetInfo, Path(dataset.root or "") / "meta" / "info.json")
+    return info.total_episodes if info else None

@@ -1,29 +1,60 @@
-"""How long a training took, from what `lerobot-train` printed."""
+"""What the log of a training tells: its command, its code, and how long it took.
+
+LeRobot prints times; a workflow adds two lines before its output: `$ COMMAND` and `# commit COMMIT`.
+"""
 
 import re
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
+_COMMAND = re.compile(r"^\$ (.+)$", re.MULTILINE)
+_COMMIT = re.compile(r"^# commit (\S+)$", re.MULTILINE)
 _LINE = re.compile(
     r"INFO (?P<time>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d) \S+ "
     r"(?:(?P<start>Start offline training)|Checkpoint policy after step (?P<step>\d+))"
 )
 
 
-def training_minutes(log: Path) -> dict[int, float]:
-    """Return how long it took to reach every checkpoint, by its step [min].
+@dataclass(frozen=True, kw_only=True)
+class TrainingLog:
+    """Facts of a log; those of a training that was continued are of its first command.
+
+    Attributes:
+        command: Command; None if the log does not say.
+        commit: Commit of the code; None if the log does not say.
+        minutes: Time to every checkpoint, by its step [min].
+    """
+
+    command: str | None = None
+    commit: str | None = None
+    minutes: dict[int, float] = field(default_factory=dict)
+
+
+def read_training_log(log: Path) -> TrainingLog:
+    """Read what the runs of a training printed, one after the other; a missing file tells nothing."""
+    if not log.is_file():
+        return TrainingLog()
+    text = log.read_text(errors="replace")
+    command, commit = _COMMAND.search(text), _COMMIT.search(text)
+    return TrainingLog(
+        command=command[1] if command else None,
+        commit=commit[1] if commit else None,
+        minutes=_minutes(text),
+    )
+
+
+def _minutes(text: str) -> dict[int, float]:
+    """Return how long it took to reach every checkpoint.
 
     Time runs from `Start offline training` and includes saving and the evaluations within the training. A training that
-    was continued goes on from the checkpoint before the first that it reaches; what it had done beyond that is lost,
+    was continued starts from the checkpoint before the first that it reaches; what it had done beyond that is lost,
     and not counted. (The line of a checkpoint comes before its files: the last one told may never have been saved.)
-
-    Args:
-        log: What `lerobot-train` printed, of all its runs one after the other; a missing file gives nothing.
     """
     minutes: dict[int, float] = {}
     start: datetime | None = None
     before: float | None = None
-    for match in _LINE.finditer(log.read_text(errors="replace") if log.is_file() else ""):
+    for match in _LINE.finditer(text):
         time = datetime.fromisoformat(match["time"])
         if match["start"]:
             start, before = time, None

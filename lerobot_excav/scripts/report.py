@@ -1,6 +1,6 @@
 """Make the table of one or more evaluations.
 
-RESULTS are metrics files (--env.metrics_path of lerobot-eval), or folders with a metrics.jsonl in them. LABEL=FILE
+METRICS are metrics files (--env.metrics_path of lerobot-eval), or folders with a metrics.jsonl in them. LABEL=FILE
 names a run; files given the same LABEL= are training seeds of one policy. With several runs, each is compared with
 the first, scene by scene.
 
@@ -10,16 +10,16 @@ success against training, a video grid.
 Examples:
   lerobot-excav report outputs/metrics.jsonl
   lerobot-excav report outputs/metrics.jsonl --operator=outputs/operator.jsonl --out=outputs/report
-      also relate the retained mass to the operator's, from `lerobot-excav bench operator`; write report.md, report.json
+      also relate the retained mass to the operator's, from `lerobot-excav operator`; write report.md, report.json
   lerobot-excav report no_mask=a1.jsonl no_mask=a2.jsonl mask=b1.jsonl mask=b2.jsonl
       two policies, two training seeds each
-  lerobot-excav report --rows=experiments/fr5_grasp/rows.toml --out=results/fr5_grasp
+  lerobot-excav report --rows=workflows/fr5_grasp/rows.toml --out=results/fr5_grasp
       the page of an experiment, from what has been run of it
-  lerobot-excav report --rows=experiments/fr5_grasp/rows.toml --metrics=results/fr5_grasp/metrics --out=outputs/page
+  lerobot-excav report --rows=workflows/fr5_grasp/rows.toml --metrics_folder=results/fr5_grasp/metrics
       the same from the copies that a page keeps
 """
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.errors import require
@@ -29,30 +29,47 @@ from lerobot_excav.evaluation.report_text import report_text
 from lerobot_excav.evaluation.run import Run
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("results", metavar="RESULTS", nargs="*", help="[LABEL=]FILE or folder")
-    parser.add_argument("--rows", type=Path, help="TOML file of a page, in place of RESULTS")
-    parser.add_argument(
-        "--metrics", type=Path, help="with --rows: folder of the metrics in place of the file's"
+def _help(text: str) -> dict[str, dict[str, str]]:
+    return {"custom_args": {"help": text}}
+
+
+@dataclass
+class ReportArguments:
+    """Options of `lerobot-excav report`."""
+
+    metrics: list[str] = field(default_factory=list, metadata=_help("[LABEL=]FILE or folder, any number"))
+    rows: Path | None = field(default=None, metadata=_help("TOML file of a page, in place of METRICS"))
+    metrics_folder: Path | None = field(
+        default=None, metadata=_help("with --rows: folder of the metrics in place of the file's")
     )
-    parser.add_argument("--operator", type=Path, help="metrics file of an operator on the same scenes")
-    parser.add_argument("--out", type=Path, help="folder for report.md and report.json")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the bootstrap (default: 0)")
+    operator: Path | None = field(
+        default=None, metadata=_help("metrics file of an operator on the same scenes")
+    )
+    out: Path | None = field(default=None, metadata=_help("folder for report.md and report.json"))
+    seed: int = field(default=0, metadata=_help("seed of the bootstrap"))
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Read, report, write."""
+def run(arguments: ReportArguments) -> int:
+    """Read, report, write; returns the exit code.
+
+    Raises:
+        ConfigurationError: Options exclude each other, or a value cannot be used.
+        DatasetError: A metrics file cannot be used.
+    """
     require(
-        bool(arguments.results) != (arguments.rows is not None), "give either RESULTS or --rows, and not both"
+        bool(arguments.metrics) != (arguments.rows is not None),
+        "give either metrics files or --rows, and not both",
     )
     if arguments.rows is not None:
         return _page(arguments)
-    require(arguments.metrics is None, f"--metrics={arguments.metrics} is of use with --rows only")
-    operator = arguments.operator and Run(
-        label="operator", evaluations=(read_evaluation(arguments.operator),)
+    require(
+        arguments.metrics_folder is None,
+        f"--metrics_folder={arguments.metrics_folder} is of use with --rows only",
     )
-    report = make_report(runs_from(arguments.results), operator=operator, seed=arguments.seed)
+    operator = None
+    if arguments.operator is not None:
+        operator = Run(label="operator", evaluations=(read_evaluation(arguments.operator),))
+    report = make_report(runs_from(arguments.metrics), operator=operator, seed=arguments.seed)
     text = report_text(report)
     print(text)
     if arguments.out is not None:
@@ -61,15 +78,18 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _page(arguments: argparse.Namespace) -> int:
+def _page(arguments: ReportArguments) -> int:
     """Make the page of an experiment."""
     from lerobot_excav.evaluation.result_page.contents import read_contents
     from lerobot_excav.evaluation.result_page.page import make_page
     from lerobot_excav.evaluation.result_page.page_files import write_page
     from lerobot_excav.evaluation.result_page.page_text import page_text
 
-    require(arguments.operator is None, "--operator is of use with RESULTS only; give it a row of the page")
-    page = make_page(read_contents(arguments.rows, metrics=arguments.metrics), seed=arguments.seed)
+    require(
+        arguments.operator is None, "--operator is of use with metrics files only; give it a row of the page"
+    )
+    assert arguments.rows is not None
+    page = make_page(read_contents(arguments.rows, metrics=arguments.metrics_folder), seed=arguments.seed)
     if arguments.out is None:
         print(page_text(page))
         return 0
@@ -102,7 +122,7 @@ def runs_from(results: list[str]) -> list[Run]:
             unlabeled.add(name)
         files.setdefault(name, []).append(path)
     named = [path.resolve() for paths in files.values() for path in paths]
-    require(len(set(named)) == len(named), "RESULTS name a file twice; a file is one evaluation")
+    require(len(set(named)) == len(named), "the metrics name a file twice; a file is one evaluation")
     return [
         Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths))
         for label, paths in files.items()

@@ -1,18 +1,14 @@
-"""The mask that an episode was shown, drawn anew from its scene and target."""
+"""The masks that an episode was shown, drawn again from its scene and its commands."""
 
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-import lerobot_excav.envs  # noqa: F401 - registers the environments
-from lerobot_excav.evaluation.episode import EpisodeKey
+from lerobot_excav.envs.tasks.measures import MASK_SETTINGS, EpisodeKey
+from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.evaluation.run import Run
-
-# They say nothing of a mask that is shown from the start.
-_NO_ARGUMENTS = ("simulation_version", "retarget_frame")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,27 +38,22 @@ def shown_masks(run: Run, key: EpisodeKey, *, height: int, width: int) -> list[S
     Raises:
         RenderingError: Pictures cannot be made on this machine.
     """
-    episode = run.evaluations[0].episodes[key]
-    arguments = {name: value for name, value in run.constants.items() if name not in _NO_ARGUMENTS}
-    env = gym.make(
-        f"lerobot_excav/{run.table.task}",
-        disable_env_checker=True,
+    names = (*MASK_SETTINGS, *run.measures.settings)
+    env = task_spec("task", run.task).make_env(
         scene_set=key.scene_set,
         observation_height=height,
         observation_width=width,
-        **arguments,
+        **{name: run.constants[name] for name in names},
     )
-    shown = {0: key.target_id}
-    if (change := run.constants.get("retarget_frame")) is not None:
-        shown[change] = getattr(episode, "final_target_id")  # noqa: B009 - a field of some tasks only
-    masks = [
-        ShownMask(since=since, pixels=_mask(env, key.scene_id, target_id))
-        for since, target_id in shown.items()
-    ]
-    env.close()
-    return masks
+    try:
+        return [
+            ShownMask(since=frame, pixels=_mask(env, key.scene_id, target_id))
+            for frame, target_id in run.evaluations[0].episodes[key].commands
+        ]
+    finally:
+        env.close()
 
 
-def _mask(env: "gym.Env[Any, Any]", scene_id: int, target_id: int) -> NDArray[np.bool_]:
+def _mask(env: Any, scene_id: int, target_id: int) -> NDArray[np.bool_]:
     observation, _ = env.reset(options={"scene_id": scene_id, "target_id": target_id})
     return np.asarray(observation["pixels"]["target_mask"][..., 0] > 127)

@@ -1,20 +1,26 @@
 """What stands on a result page, as a TOML file says it."""
 
+import json
 import os
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import BaseModel, ConfigDict, model_validator
+
 from lerobot_excav.errors import ConfigurationError, require
-from lerobot_excav.evaluation.result_page.toml_table import TomlTable
+from lerobot_excav.evaluation.validated import validated
 
 CURVES = "curves"
 """Folder of the curves' metrics beside those of the rows, where a page keeps copies."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Row(TomlTable):
+class _Table(BaseModel):
+    """A table of the file, whose keys are the fields of the class."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Row(_Table):
     """A row: one evaluation.
 
     Attributes:
@@ -25,11 +31,10 @@ class Row(TomlTable):
 
     label: str
     about: str
-    paper: Mapping[str, float] | None = None
+    paper: dict[str, float] = {}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Section(TomlTable):
+class Section(_Table):
     """A table of rows.
 
     Attributes:
@@ -45,8 +50,7 @@ class Section(TomlTable):
     reference: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class CurveSource(TomlTable):
+class CurveSource(_Table):
     """Evaluations of the checkpoints of one training.
 
     Attributes:
@@ -58,8 +62,7 @@ class CurveSource(TomlTable):
     folder: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class Clips(TomlTable):
+class Clips(_Table):
     """Clips of one evaluation, side by side in the video grid.
 
     Attributes:
@@ -71,8 +74,7 @@ class Clips(TomlTable):
     episodes: tuple[int, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contents(TomlTable):
+class Contents(_Table):
     """Everything on the page.
 
     Attributes:
@@ -101,6 +103,21 @@ class Contents(TomlTable):
         folder = Path(self.metrics) / label / "metrics.jsonl"
         return folder if folder.exists() else Path(self.metrics) / f"{label}.jsonl"
 
+    @model_validator(mode="after")
+    def _names_fit(self) -> "Contents":
+        labels = [row.label for row in self.rows]
+        # A page keeps the metrics of a curve by the name of its folder.
+        folders = [Path(curve.folder).name for curve in self.curve]
+        if twice := sorted({label for label in labels if labels.count(label) > 1}):
+            raise ValueError(f"{twice} stands on the page twice")
+        if twice := sorted({name for name in folders if folders.count(name) > 1}):
+            raise ValueError(f"{twice} are the folders of two curves; name each folder once")
+        named = [section.reference for section in self.section if section.reference is not None]
+        for label in [*named, *(clips.label for clips in self.clips)]:
+            if label not in labels:
+                raise ValueError(f"{label!r} is not a row; allowed: {', '.join(labels)}")
+        return self
+
 
 def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     """Read what stands on a page.
@@ -112,28 +129,26 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
 
     Raises:
         ConfigurationError: The file is missing or damaged, a key is unknown or missing, a value is of another type, a
-            row or a curve occurs twice, or a reference is no row.
+            row or a curve occurs twice, or a reference is not a row.
     """
+    require(path.is_file(), f"--rows={path} does not exist")
     try:
         content = tomllib.loads(path.read_text())
-    except FileNotFoundError:
-        raise ConfigurationError(f"--rows={path} does not exist") from None
     except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"--rows={path} is no TOML: {error}") from error
-    contents = Contents.read(content, f"{path}: ")
-    if metrics is not None:
-        contents = _moved(contents, metrics)
-    _check(contents, str(path))
-    return contents
+        raise ConfigurationError(f"--rows={path} is not TOML: {error}") from error
+    # Dates have no JSON form; as text they are refused where a number is asked for.
+    text = json.dumps(content, default=str)
+    contents = validated(Contents, text, f"--rows={path}", error=ConfigurationError)
+    return contents if metrics is None else _moved(contents, metrics)
 
 
 def _moved(contents: Contents, metrics: Path) -> Contents:
     """Return the contents with the metrics of rows and curves elsewhere."""
     curves = [
-        replace(curve, folder=str(_moved_curve(Path(curve.folder), contents.metrics, metrics)))
+        curve.model_copy(update={"folder": str(_moved_curve(Path(curve.folder), contents.metrics, metrics))})
         for curve in contents.curve
     ]
-    return replace(contents, metrics=str(metrics), curve=tuple(curves))
+    return contents.model_copy(update={"metrics": str(metrics), "curve": tuple(curves)})
 
 
 def _moved_curve(folder: Path, metrics: str, moved_metrics: Path) -> Path:
@@ -141,16 +156,3 @@ def _moved_curve(folder: Path, metrics: str, moved_metrics: Path) -> Path:
     kept = moved_metrics / CURVES / folder.name
     seen_from_there = Path(os.path.normpath(moved_metrics / os.path.relpath(folder, metrics)))
     return kept if kept.exists() else seen_from_there
-
-
-def _check(contents: Contents, place: str) -> None:
-    labels = [row.label for row in contents.rows]
-    twice = sorted({label for label in labels if labels.count(label) > 1})
-    require(not twice, f"{place}: {twice} stands on the page twice")
-    # A page keeps the metrics of a curve by the name of its folder.
-    folders = [Path(curve.folder).name for curve in contents.curve]
-    twice = sorted({name for name in folders if folders.count(name) > 1})
-    require(not twice, f"{place}: {twice} are the folders of two curves; name each folder once")
-    named = [section.reference for section in contents.section if section.reference is not None]
-    for label in [*named, *(clips.label for clips in contents.clips)]:
-        require(label in labels, f"{place}: {label!r} is no row; allowed: {', '.join(labels)}")

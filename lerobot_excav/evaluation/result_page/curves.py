@@ -6,7 +6,7 @@ from typing import Any
 
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.metrics import read_evaluation
-from lerobot_excav.evaluation.provenance import read_provenance
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.result_page.contents import CurveSource
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import Interval, wilson_interval
@@ -18,28 +18,25 @@ class CurvePoint:
 
     Attributes:
         step: Its training step.
-        minutes: Training time up to it [min]; None if no log tells.
         run: The episodes, all in scenes of one set.
+        origin: Where the evaluation comes from.
         success: Rate with Wilson interval.
     """
 
     step: int
-    minutes: float | None
     run: Run
+    origin: EvaluationOrigin
     success: Interval
+
+    @property
+    def minutes(self) -> float | None:
+        """Training time up to the checkpoint [min]; None if no log tells."""
+        return self.origin.training.minutes if self.origin.training else None
 
     @property
     def scene_set(self) -> str:
         """Scenes that it played."""
         return self.run.episodes[0].scene_set
-
-    @property
-    def setting(self) -> str:
-        """What tells its task's runs apart, in words."""
-        first = self.run.episodes[0]
-        return ", ".join(
-            f"{header} {getattr(first, field)}" for header, field in self.run.table.setting.items()
-        )
 
     @property
     def n(self) -> int:
@@ -58,7 +55,7 @@ class CurvePoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class SuccessCurve:
     """Success of the checkpoints of one training, by their step.
 
     Attributes:
@@ -76,7 +73,7 @@ class Curve:
         return {"label": self.label, "name": self.name, "points": [point.as_dict() for point in self.points]}
 
 
-def read_curve(source: CurveSource) -> Curve:
+def read_curve(source: CurveSource) -> SuccessCurve:
     """Read the evaluations of a training's checkpoints that are there: `STEP/metrics.jsonl` or `STEP.jsonl`.
 
     Raises:
@@ -84,16 +81,13 @@ def read_curve(source: CurveSource) -> Curve:
         DatasetError: A metrics file cannot be used, or the checkpoints played different sets of scenes or conditions.
     """
     folder = Path(source.folder)
-    files = {
-        int(path.parent.name): path
-        for path in folder.glob("[0-9]*/metrics.jsonl")
-        if path.parent.name.isdigit()
-    }
-    files |= {int(path.stem): path for path in folder.glob("[0-9]*.jsonl") if path.stem.isdigit()}
+    named = [(path.parent.name, path) for path in folder.glob("*/metrics.jsonl")]
+    named += [(path.stem, path) for path in folder.glob("*.jsonl")]
+    files = {int(step): path for step, path in named if step.isdigit()}
     points = tuple(_point(step, files[step]) for step in sorted(files))
     for point in points:
         _require_alike(points[0], point)
-    return Curve(label=source.label, name=folder.name, points=points)
+    return SuccessCurve(label=source.label, name=folder.name, points=points)
 
 
 def _point(step: int, metrics: Path) -> CurvePoint:
@@ -103,22 +97,20 @@ def _point(step: int, metrics: Path) -> CurvePoint:
         raise DatasetError(
             f"{metrics} mixes scenes of {' and '.join(sets)}; a point of a curve is of one set"
         )
-    training = read_provenance(metrics).training
     return CurvePoint(
         step=step,
-        minutes=training.minutes if training else None,
         run=run,
+        origin=EvaluationOrigin.read(metrics),
         success=wilson_interval(sum(episode.is_success for episode in run.episodes), len(run.episodes)),
     )
 
 
 def _require_alike(first: CurvePoint, point: CurvePoint) -> None:
     """Raise `DatasetError` unless two checkpoints played one task in scenes of one set under equal conditions."""
-    played = [{"task": p.run.table.task, "scene_set": p.scene_set, **p.run.constants} for p in (first, point)]
-    unlike = [name for name, value in played[0].items() if played[1].get(name) != value]
-    if unlike:
-        name = unlike[0]
-        raise DatasetError(
-            f"{first.metrics} has {name}={played[0][name]!r} and {point.metrics} {played[1].get(name)!r}; "
-            "the points of a curve differ in their training only: put them into folders of their own"
-        )
+    played = [{"task": p.run.task, "scene_set": p.scene_set, **p.run.constants} for p in (first, point)]
+    for name, value in played[0].items():
+        if played[1].get(name) != value:
+            raise DatasetError(
+                f"{first.metrics} has {name}={value!r} and {point.metrics} {played[1].get(name)!r}; "
+                "the points of a curve differ in their training only: put them into folders of their own"
+            )

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
+from lerobot_excav.envs.tasks.measures import TaskMeasures
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.comparison import Difference, compare, require_same_task
 from lerobot_excav.evaluation.metrics import read_evaluation
-from lerobot_excav.evaluation.provenance import Provenance, read_provenance
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report import file_notes
 from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
-from lerobot_excav.evaluation.result_page.curves import Curve, read_curve
+from lerobot_excav.evaluation.result_page.curves import SuccessCurve, read_curve
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, summarise
-from lerobot_excav.evaluation.task_table import TaskTable
-from lerobot_excav.evaluation.training import Training
+from lerobot_excav.evaluation.training import TrainingFacts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,13 +27,13 @@ class PageRow:
         row: What the page says of it.
         run: The episodes.
         summary: The measures.
-        provenance: Command, code and training.
+        origin: Command, code and training.
     """
 
     row: Row
     run: Run
     summary: RunSummary
-    provenance: Provenance
+    origin: EvaluationOrigin
 
     @property
     def metrics(self) -> Path:
@@ -50,9 +50,9 @@ class PageRow:
         return {
             **self.summary.as_dict(),
             "about": self.row.about,
-            "paper": dict(self.row.paper or {}),
+            "paper": self.row.paper,
             "seed": self.seed,
-            "provenance": self.provenance.as_dict(),
+            "origin": self.origin.model_dump(),
         }
 
 
@@ -112,7 +112,7 @@ class ResultPage:
 
     contents: Contents
     sections: list[PageSection]
-    curves: list[Curve]
+    curves: list[SuccessCurve]
     bootstrap_seed: int
 
     @property
@@ -121,12 +121,12 @@ class ResultPage:
         return [row for section in self.sections for row in section.rows]
 
     @property
-    def trainings(self) -> list[Training]:
+    def trainings(self) -> list[TrainingFacts]:
         """The checkpoints that were evaluated, each once."""
         found = {
-            (row.provenance.training.name, row.provenance.training.steps): row.provenance.training
+            (training.name, training.steps): training
             for row in self.rows
-            if row.provenance.training is not None
+            if (training := row.origin.training) is not None
         }
         return list(found.values())
 
@@ -177,7 +177,7 @@ def _is_run(contents: Contents, row: Row) -> bool:
 def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
     path = contents.metrics_path(row.label)
     run = Run(label=row.label, evaluations=(read_evaluation(path),))
-    return PageRow(row=row, run=run, summary=summarise(run, None, rng), provenance=read_provenance(path))
+    return PageRow(row=row, run=run, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
 
 
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
@@ -186,7 +186,7 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
     for row in present:
         require_same_task((reference or present[0]).run, row.run)
     if present:
-        _require_known_figures(section, present[0].summary.table)
+        _require_known_figures(section, present[0].run.measures)
     return PageSection(
         section=section,
         rows=present,
@@ -197,13 +197,13 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
     )
 
 
-def _require_known_figures(section: Section, table: TaskTable) -> None:
+def _require_known_figures(section: Section, measures: TaskMeasures) -> None:
     """Raise `ConfigurationError` unless every figure of the paper stands beside a column, also in rows not yet run."""
     for row in section.rows:
-        for key in row.paper or {}:
+        for key in row.paper:
             require(
-                key in table.compared,
-                f"row {row.label!r}: paper.{key} has no column; allowed: {', '.join(table.compared)}",
+                key in measures.compared,
+                f"row {row.label!r}: paper.{key} has no column; allowed: {', '.join(measures.compared)}",
             )
 
 

@@ -4,7 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
-from lerobot_excav.evaluation.provenance import Provenance, read_provenance
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.result_page.contents import CURVES
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
@@ -16,7 +16,7 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     """Write a page, its data, and the metrics that it is made of.
 
     `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4`, and `metrics/LABEL.jsonl`
-    with `metrics/LABEL.json`, where it comes from. A page can be made anew from these copies; those of an earlier page
+    with `metrics/LABEL.json`, where it comes from. A page can be made again from these copies; those of an earlier page
     are removed. A plot or video that could not be made again, because checkpoints or videos are gone, stays.
 
     Args:
@@ -42,13 +42,11 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
 
 def _keep_metrics(page: ResultPage, folder: Path) -> None:
     """Copy what the page is made of, and remove what an earlier one was: a page made of the copies must be the same."""
-    copies = [
-        _copy_metrics(row.metrics, folder / f"{row.row.label}.jsonl", row.provenance) for row in page.rows
-    ]
+    copies = [_copy_metrics(row.metrics, folder / f"{row.row.label}.jsonl", row.origin) for row in page.rows]
     for curve in page.curves:
         for point in curve.points:
             copy = folder / CURVES / curve.name / f"{point.step:06d}.jsonl"
-            copies.append(_copy_metrics(point.metrics, copy, read_provenance(point.metrics)))
+            copies.append(_copy_metrics(point.metrics, copy, point.origin))
     if Path(page.contents.metrics).resolve() == folder.resolve():
         return  # made of the copies themselves
     for kept in [*folder.glob("*.jsonl"), *folder.glob(f"{CURVES}/*/*.jsonl")]:
@@ -58,11 +56,11 @@ def _keep_metrics(page: ResultPage, folder: Path) -> None:
             origin.unlink()
 
 
-def _copy_metrics(metrics: Path, copy: Path, provenance: Provenance) -> Path:
+def _copy_metrics(metrics: Path, copy: Path, origin: EvaluationOrigin) -> Path:
     copy.parent.mkdir(parents=True, exist_ok=True)
     if metrics.resolve() != copy.resolve():
         shutil.copyfile(metrics, copy)
-    copy.with_suffix(".json").write_text(json.dumps(provenance.as_dict(), indent=1) + "\n")
+    copy.with_suffix(".json").write_text(origin.model_dump_json(indent=1) + "\n")
     return copy
 
 

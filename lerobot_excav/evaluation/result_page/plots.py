@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lerobot_excav.evaluation.result_page.curves import Curve, CurvePoint
+from lerobot_excav.evaluation.result_page.curves import CurvePoint, SuccessCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ _SIZE_IN = (8.0, 3.2)
 _DPI = 90
 
 
-def plot_curves(curves: Sequence[Curve], path: Path) -> None:
+def plot_curves(curves: Sequence[SuccessCurve], path: Path) -> None:
     """Draw success against training steps and, where logs tell, against training minutes.
 
     Args:

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,9 +11,12 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.masks.overlay import tinted
+from lerobot_excav.envs.tasks.measures import EpisodeRecord
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
+from lerobot_excav.evaluation.video import Image, write_video
 
 logger = logging.getLogger(__name__)
 
@@ -21,16 +24,11 @@ MAX_BYTES = 1_500_000
 """What a video in a repository may weigh."""
 
 FRAMES_PER_SECOND = 25
-TINT_RGB = (235, 60, 40)
-SUCCESS_RGB, FAILURE_RGB = (60, 180, 75), (128, 128, 128)
+SUCCESS_RGB, OBEYED_RGB, FAILURE_RGB = (60, 180, 75), (40, 110, 235), (128, 128, 128)
 
-_TINT = 0.35
-_OUTLINE_RGB = (255, 255, 255)
 _TILE_HEIGHT = 192
 _BORDER = 4
 _QUALITIES = (26, 30, 34, 38, 42)  # constant rate factors of x264, from good to coarse
-
-Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +38,12 @@ class Clip:
     Attributes:
         path: Video of one episode.
         masks: What the mask marked; drawn into the video.
-        is_success: Whether the episode succeeded; the colour of the border.
+        episode: Its record, which colours the border.
     """
 
     path: Path
     masks: Sequence[ShownMask]
-    is_success: bool
+    episode: EpisodeRecord
 
 
 def grid_clips(page: ResultPage) -> list[list[Clip]]:
@@ -62,7 +60,9 @@ def present_clips(page: ResultPage) -> list[Clips]:
     """Return what the video grid of a page can show: its contents without the episodes whose videos are not there."""
     rows = {row.row.label: row for row in page.rows}
     present = [
-        replace(clips, episodes=tuple(n for n in clips.episodes if _video(rows[clips.label], n).is_file()))
+        clips.model_copy(
+            update={"episodes": tuple(n for n in clips.episodes if _video(rows[clips.label], n).is_file())}
+        )
         for clips in page.contents.clips
         if clips.label in rows
     ]
@@ -80,7 +80,7 @@ def _clip(row: PageRow, number: int) -> Clip:
     key, episode = list(row.run.evaluations[0].episodes.items())[number]
     height, width = next(read_video(_video(row, number))).shape[:2]
     masks = shown_masks(row.run, key, height=height, width=width)
-    return Clip(path=_video(row, number), masks=masks, is_success=episode.is_success)
+    return Clip(path=_video(row, number), masks=masks, episode=episode)
 
 
 def read_video(path: Path) -> Iterator[Image]:
@@ -93,24 +93,21 @@ def read_video(path: Path) -> Iterator[Image]:
 def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
     """Write clips as one video, in real time, as fine as `MAX_BYTES` allows; warn if the coarsest weighs more.
 
-    Shorter clips stand still at their end. The border of a tile is green if its episode succeeded.
+    Shorter clips stand still at their end. The border of a tile is green if its episode succeeded, blue if the machine
+    did what the shown mask said, which was not the command, and grey otherwise.
 
     Args:
-        path: File to write (mp4); its folder is made. It appears when the video is complete.
+        path: File to write (mp4); its folder is made.
         rows: Clips row by row.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
     pictures = _grid_pictures(rows)
     for quality in _QUALITIES:
-        _encode(partial, pictures, quality)
-        if partial.stat().st_size <= MAX_BYTES:
-            break
-    else:
-        logger.warning(
-            f"{path} weighs {partial.stat().st_size} bytes, more than {MAX_BYTES}; show fewer clips, or shorter ones"
-        )
-    partial.replace(path)
+        write_video(path, pictures, FRAMES_PER_SECOND, crf=quality)
+        if path.stat().st_size <= MAX_BYTES:
+            return
+    logger.warning(
+        f"{path} weighs {path.stat().st_size} bytes, more than {MAX_BYTES}; show fewer clips, or shorter ones"
+    )
 
 
 def _grid_pictures(rows: Sequence[Sequence[Clip]]) -> list[Image]:
@@ -132,7 +129,7 @@ def _band(tiles: Sequence[Image], width: int) -> Image:
 def _tiles(clip: Clip) -> list[Image]:
     """Return the pictures of a clip at the grid's size and rate, tinted and framed."""
     ticks_per_frame = FRAMES_PER_SECOND / _rate(clip.path)
-    colour = SUCCESS_RGB if clip.is_success else FAILURE_RGB
+    colour = _border_rgb(clip.episode)
     tiles: list[Image] = []
     for number, image in enumerate(read_video(clip.path)):
         # A frame is seen at the grid's ticks until the next one begins: at several, or at none.
@@ -143,6 +140,12 @@ def _tiles(clip: Clip) -> list[Image]:
     return tiles
 
 
+def _border_rgb(episode: EpisodeRecord) -> tuple[int, int, int]:
+    if episode.is_success:
+        return SUCCESS_RGB
+    return OBEYED_RGB if episode.obeyed_shown_mask else FAILURE_RGB
+
+
 def _rate(path: Path) -> Fraction:
     with av.open(str(path)) as container:
         return Fraction(container.streams.video[0].average_rate)
@@ -150,21 +153,6 @@ def _rate(path: Path) -> Fraction:
 
 def _mask_at(masks: Sequence[ShownMask], frame: int) -> NDArray[np.bool_]:
     return [mask.pixels for mask in masks if mask.since <= frame][-1]
-
-
-def tinted(image: Image, pixels: NDArray[np.bool_]) -> Image:
-    """Return a picture with some pixels tinted and outlined: they may be as red as the tint.
-
-    Args:
-        image: uint8 (H, W, 3).
-        pixels: bool (H, W).
-    """
-    result = image.copy()
-    result[pixels] = ((1.0 - _TINT) * image[pixels] + _TINT * np.array(TINT_RGB)).astype(np.uint8)
-    around = np.pad(pixels, 1)
-    touched = around[2:, 1:-1] | around[:-2, 1:-1] | around[1:-1, 2:] | around[1:-1, :-2]
-    result[touched & ~pixels] = _OUTLINE_RGB
-    return result
 
 
 def enlarged[Pixels: (NDArray[np.uint8], NDArray[np.bool_])](image: Pixels) -> Pixels:
@@ -179,15 +167,3 @@ def framed(image: Image, colour: tuple[int, int, int]) -> Image:
     for edge in (result[:_BORDER], result[-_BORDER:], result[:, :_BORDER], result[:, -_BORDER:]):
         edge[...] = colour
     return result
-
-
-def _encode(path: Path, pictures: Sequence[Image], quality: int) -> None:
-    height, width = (size - size % 2 for size in pictures[0].shape[:2])
-    with av.open(str(path), mode="w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(FRAMES_PER_SECOND))
-        stream.height, stream.width, stream.pix_fmt = height, width, "yuv420p"
-        stream.options = {"crf": str(quality), "preset": "slow"}
-        for image in pictures:
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="rgb24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))

@@ -1,15 +1,16 @@
-"""Scoop-v0 in reports; `docs/datasets.md` defines the measures."""
+"""What is measured of Scoop-v0; `docs/datasets.md` defines the measures."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from lerobot_excav.envs.tasks.scoop.simulation_version import UNMARKED_VERSION
-from lerobot_excav.evaluation.episode import Episode
-from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
+from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
+from lerobot_excav.envs.tasks.scoop.task_state import TASK_STATE_NAMES
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScoopEpisode(Episode):
+class ScoopRecord(EpisodeRecord):
     """Outcome of one dig-load-dump cycle.
 
     Attributes:
@@ -30,15 +31,6 @@ class ScoopEpisode(Episode):
     hard_target_contacts: int
     spill_before_target_events: int
 
-    @classmethod
-    def completed(cls, record: dict[str, Any]) -> dict[str, Any]:
-        """Add what earlier files do not hold: version and fidelity, of which there was one only, and noise, of none."""
-        defaults = {"simulation_version": UNMARKED_VERSION, "mask_noise": "none", "mask_noise_px": 0}
-        record = {**defaults, **record}
-        if record["simulation_version"] == UNMARKED_VERSION:
-            record.setdefault("fidelity", "standard")
-        return record
-
     @property
     def has_hard_contact(self) -> bool:
         """Whether the box was hit hard."""
@@ -50,6 +42,24 @@ class ScoopEpisode(Episode):
         return self.spill_before_target_events > 0
 
 
+def scoop_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
+    """Return masses [kg] and events of an episode from its task states, (n, 8)."""
+    last = dict(zip(TASK_STATE_NAMES, task_state[-1].tolist(), strict=True))
+    deposited = task_state[:, TASK_STATE_NAMES.index("deposited_mass_kg")]
+    return {
+        "retained_mass_kg": float(deposited[-1] - deposited[0]),
+        "residual_bucket_mass_kg": last["bucket_mass_kg"],
+        "excavated_mass_kg": last["excavated_mass_kg"],
+        "hard_target_contacts": round(last["hard_target_contacts"]),
+        "spill_before_target_events": round(last["spill_before_target_events"]),
+    }
+
+
+def scoop_summary(index: "pd.DataFrame") -> str:
+    """Describe the outcomes of an index."""
+    return f"retained mass: {index['retained_mass_kg'].mean():.0f} kg on average"
+
+
 def _legend(operator: str | None) -> list[str]:
     if operator is None:
         return []
@@ -58,17 +68,10 @@ def _legend(operator: str | None) -> list[str]:
     ]
 
 
-SCOOP = TaskTable(
-    task="Scoop-v0",
-    episode=ScoopEpisode,
-    constants={
-        "mask_condition": "mask conditions",
-        "mask_noise": "kinds of mask noise",
-        "mask_noise_px": "strengths of mask noise",
-        "soil": "soils",
-        "fidelity": "fidelities",
-        "simulation_version": "versions of the simulation",
-    },
+SCOOP_MEASURES = TaskMeasures(
+    record=ScoopRecord,
+    settings={"soil": "soils", "fidelity": "fidelities"},
+    shared={},
     setting={"soil": "soil", "mask": "mask"},
     columns=(
         Column(key="target_success", header="target success [%]", kind=Kind.RATE, field="target_success"),
@@ -88,4 +91,6 @@ SCOOP = TaskTable(
     world="dug {soil} in version {simulation_version} of the simulation",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
+    outcome=scoop_outcome,
+    summary=scoop_summary,
 )

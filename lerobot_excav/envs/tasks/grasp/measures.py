@@ -1,31 +1,29 @@
-"""FR5Grasp-v0 in reports: success, and apart from it which block was grasped."""
+"""What is measured of FR5Grasp-v0: success, and apart from it which block was grasped."""
 
-from dataclasses import dataclass
-from typing import override
+from typing import TYPE_CHECKING, Any, override
 
 from lerobot_excav.envs.machines.fr5.layout import NO_BLOCK
-from lerobot_excav.evaluation.episode import Episode
-from lerobot_excav.evaluation.task_table import Column, Kind, TaskTable
+from lerobot_excav.envs.tasks.grasp.task import TASK_STATE_NAMES
+from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
 
 COMMANDED, OTHER, NONE = GRASPED = ("commanded", "other", "none")
 
 
-@dataclass(frozen=True, kw_only=True)
-class GraspEpisode(Episode):
-    """Outcome of one grasping episode.
+class GraspRecord(EpisodeRecord):
+    """Outcome of one grasping episode; where the command changed, the last one counts.
 
     Attributes:
-        final_target_id: Block that is commanded at the end; it differs from `target_id` where the command changed.
-        retarget_frame: Frame at which the command changed; None if it did not.
         episode_return: Sum of the rewards.
-        first_grasped_block: First block that the fingers lifted; -1 if they lifted none.
+        first_grasped_block: First block that the fingers lifted since the last command; -1 if they lifted none.
         shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none, None if there was no mask.
         target_in_tray: Whether the commanded block rests in the tray.
         blocks_in_tray: How many blocks do.
     """
 
-    final_target_id: int
-    retarget_frame: int | None
     episode_return: float
     first_grasped_block: int
     shown_block: int | None
@@ -34,7 +32,7 @@ class GraspEpisode(Episode):
 
     @property
     def grasped(self) -> str:
-        """Which block was grasped first: `commanded` (at the end of the episode), `other` or `none`."""
+        """Which block was grasped first: `commanded`, `other` or `none`."""
         if self.first_grasped_block == NO_BLOCK:
             return NONE
         return COMMANDED if self.first_grasped_block == self.final_target_id else OTHER
@@ -63,10 +61,25 @@ class GraspEpisode(Episode):
 
     @property
     @override
-    def mask(self) -> str:
-        """What the mask showed, in words."""
-        change = "" if self.retarget_frame is None else f", changed at frame {self.retarget_frame}"
-        return super().mask + change
+    def obeyed_shown_mask(self) -> bool:
+        """Whether the block that was grasped first is the one that the mask showed, and not the commanded one."""
+        return self.mask_followed is True and self.grasped == OTHER
+
+
+def grasp_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
+    """Return what was grasped and what lies in the tray, from the task states of an episode, (n, 8)."""
+    last = dict(zip(TASK_STATE_NAMES, task_state[-1].tolist(), strict=True))
+    return {
+        "first_grasped_block": round(last["first_grasped_block"]),
+        "target_in_tray": bool(last["target_in_tray"]),
+        "blocks_in_tray": round(last["blocks_in_tray"]),
+    }
+
+
+def grasp_summary(index: "pd.DataFrame") -> str:
+    """Describe the outcomes of an index."""
+    took_target = int((index["first_grasped_block"] == index["target_id"]).sum())
+    return f"first block taken: the commanded one in {took_target} of {len(index)}"
 
 
 def _legend(operator: str | None) -> list[str]:
@@ -80,16 +93,10 @@ def _legend(operator: str | None) -> list[str]:
     return lines if operator is None else [*lines, f"Operator: {operator}."]
 
 
-GRASP = TaskTable(
-    task="FR5Grasp-v0",
-    episode=GraspEpisode,
-    constants={
-        "mask_condition": "mask conditions",
-        "mask_noise": "kinds of mask noise",
-        "mask_noise_px": "strengths of mask noise",
-        "retarget_frame": "times of the change of target",
-        "simulation_version": "versions of the simulation",
-    },
+GRASP_MEASURES = TaskMeasures(
+    record=GraspRecord,
+    settings={},
+    shared={"changes": "times at which the command changes"},
     setting={"mask": "mask"},
     columns=(
         Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
@@ -106,4 +113,6 @@ GRASP = TaskTable(
     world="was played in version {simulation_version} of the simulation",
     simulation="version {simulation_version}",
     legend=_legend,
+    outcome=grasp_outcome,
+    summary=grasp_summary,
 )

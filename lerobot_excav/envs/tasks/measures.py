@@ -1,0 +1,199 @@
+"""What is measured of a task: the record of an episode, and the columns that sum records up."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, model_validator
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+MASK_SETTINGS = {
+    "mask_source": "mask sources",
+    "mask_condition": "mask conditions",
+    "mask_noise": "kinds of mask noise",
+    "mask_noise_px": "strengths of mask noise",
+}
+"""What says which mask was shown, with its plural for messages; every environment takes these as settings."""
+
+
+class EpisodeKey(NamedTuple):
+    """What makes episodes of two runs comparable."""
+
+    scene_set: str
+    scene_id: int
+    target_id: int
+
+    def __str__(self) -> str:
+        return f"{self.scene_set}/{self.scene_id}/{self.target_id}"
+
+
+class CommandedTarget(NamedTuple):
+    """A target, and the first frame in which it was commanded."""
+
+    frame: int
+    target_id: int
+
+
+class EpisodeRecord(BaseModel):
+    """A line of a metrics file. A task adds its own fields in a subclass; entries that are no fields are left out.
+
+    Attributes:
+        simulation_version: Version of the simulation.
+        task: Task, as in `--env.task`.
+        scene_set: Scene set.
+        scene_id: Scene.
+        target_id: Target that is commanded first.
+        mask_source: What made the mask.
+        mask_condition: Which mask was shown.
+        mask_noise: How it was disturbed.
+        mask_noise_px: By how much [px].
+        target_overlay: Whether the mask was tinted into the main picture.
+        is_success: Whether every part of the task succeeded.
+        frames: Length of the episode.
+        mask_missing_frames: Frames without a mask, because the source found nothing.
+        commands: All commands, in their order; the first begins at frame 0.
+    """
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+    simulation_version: int
+    task: str
+    scene_set: str
+    scene_id: int
+    target_id: int
+    mask_source: str
+    mask_condition: str
+    mask_noise: str
+    mask_noise_px: int
+    target_overlay: bool
+    is_success: bool
+    frames: int
+    mask_missing_frames: int
+    commands: tuple[CommandedTarget, ...]
+
+    @model_validator(mode="after")
+    def _commands_follow_each_other(self) -> Self:
+        frames = [command.frame for command in self.commands]
+        if self.commands[:1] != ((0, self.target_id),) or frames != sorted(set(frames)):
+            raise ValueError(
+                f"commands={[list(command) for command in self.commands]} must be pairs of frame and target, in the "
+                f"order of their frames, and begin with [0, target_id={self.target_id}]"
+            )
+        return self
+
+    @property
+    def key(self) -> EpisodeKey:
+        """Scene and first target."""
+        return EpisodeKey(self.scene_set, self.scene_id, self.target_id)
+
+    @property
+    def final_target_id(self) -> int:
+        """Target that is commanded at the end."""
+        return self.commands[-1].target_id
+
+    @property
+    def changes(self) -> tuple[int, ...]:
+        """Frames at which the command changed."""
+        return tuple(command.frame for command in self.commands[1:])
+
+    @property
+    def mask(self) -> str:
+        """What the mask showed, in words."""
+        words = [self.mask_condition]
+        if self.mask_source != "oracle":
+            words.append(f"from {self.mask_source}")
+        if self.mask_noise != "none":
+            words.append(f"{self.mask_noise} {self.mask_noise_px} px")
+        if self.target_overlay:
+            words.append("as overlay")
+        if self.changes:
+            words.append(f"changed at frame {' and '.join(map(str, self.changes))}")
+        return ", ".join(words)
+
+    @property
+    def obeyed_shown_mask(self) -> bool | None:
+        """Whether the machine did what the shown mask said, which was not the command; None if no field tells."""
+        return None
+
+
+class Kind(Enum):
+    """How a column sums up episodes."""
+
+    RATE = auto()
+    """Share of the episodes with a truth value that is true; Wilson interval over these episodes."""
+    MEAN = auto()
+    """Mean; bootstrap interval over scenes and targets."""
+    RATIO = auto()
+    """Mean over the operator's on the same scenes and targets; bootstrap interval."""
+    COUNTS = auto()
+    """How often each word occurs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One measure of a task.
+
+    Attributes:
+        key: Name in `report.json`.
+        header: Name in tables.
+        kind: How episodes are summed up.
+        field: Field or property of the task's record; None leaves an episode out of a rate.
+        words: For counts, all words in the order of the table.
+    """
+
+    key: str
+    header: str
+    kind: Kind
+    field: str
+    words: tuple[str, ...] = ()
+
+    @property
+    def scale(self) -> float:
+        """Factor to the unit of the header: shares are shown in percent."""
+        return 100.0 if self.kind in (Kind.RATE, Kind.RATIO) else 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskMeasures:
+    """Everything that reports, and the index of a dataset, know of a task.
+
+    Attributes:
+        record: What a line of a metrics file holds.
+        settings: Settings of the task's own environment that all episodes of a run share, with their plural.
+        shared: Further fields or properties of the record that all episodes of a run share, with their plural.
+        setting: Headers and fields of the columns that tell runs apart.
+        columns: The measures.
+        compared: Keys of the measures whose paired differences are given.
+        world: What two runs must share for a scene's number to mean the same scene, as text with fields in braces.
+        simulation: Description of the simulation, as text with fields in braces.
+        legend: Explains the columns, line by line; takes who the operator was, None without one.
+        outcome: Turns the task states of an episode, (n, k), into columns of the paired-scene index.
+        summary: Describes the outcomes of an index in a few words.
+    """
+
+    record: type[EpisodeRecord]
+    settings: Mapping[str, str]
+    shared: Mapping[str, str]
+    setting: Mapping[str, str]
+    columns: tuple[Column, ...]
+    compared: tuple[str, ...]
+    world: str
+    simulation: str
+    legend: Callable[[str | None], list[str]]
+    outcome: Callable[["NDArray[Any]"], dict[str, Any]]
+    summary: Callable[["pd.DataFrame"], str]
+
+    @property
+    def constants(self) -> dict[str, str]:
+        """All that the episodes of a run share, with the plural for messages."""
+        version = {"simulation_version": "versions of the simulation"}
+        overlay = {"target_overlay": "pictures with and without overlay"}
+        return {**MASK_SETTINGS, **overlay, **self.settings, **self.shared, **version}
+
+    def column(self, key: str) -> Column:
+        """Return a column by its key."""
+        return next(column for column in self.columns if column.key == key)

@@ -1,0 +1,66 @@
+"""Markdown of reports: the templates of this package, and tables that read as plain text, too."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from lerobot_excav.envs.tasks.measures import Column
+from lerobot_excav.evaluation.comparison import Difference
+from lerobot_excav.evaluation.run_summary import RateOf, Value
+from lerobot_excav.evaluation.statistics import Interval
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+def render(template: str, **values: Any) -> str:
+    """Fill a template.
+
+    Args:
+        template: Name of the file in `templates/`, without `.md.jinja`.
+        values: Values by their names in the template; `table(header, rows)` is there as well.
+    """
+    return _templates().get_template(f"{template}.md.jinja").render(table=markdown_table, **values)
+
+
+@cache
+def _templates() -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("lerobot_excav.evaluation"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=StrictUndefined,
+    )
+
+
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Lay out a table whose columns line up, so that it reads well unrendered."""
+    widths = [max(map(len, cells)) for cells in zip(header, *rows, strict=True)]
+    lines = [header, ["-" * width for width in widths], *rows]
+    padded = ([cell.ljust(width) for cell, width in zip(line, widths, strict=True)] for line in lines)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in padded)
+
+
+def value_text(column: Column, value: Value) -> str:
+    """Write the value of a column, with its interval and, if it is a rate of some episodes only, their number."""
+    if value is None:
+        return "-"
+    if isinstance(value, dict):
+        return " / ".join(str(value[word]) for word in column.words)
+    of = f" of {value.n}" if isinstance(value, RateOf) else ""
+    return interval_text(value, scale=column.scale) + of
+
+
+def difference_cells(column: Column, change: Difference) -> list[str]:
+    """Write a difference and its p-value."""
+    p_value = "-" if change.p_value is None else f"{change.p_value:.3g}"
+    return [interval_text(change.difference, scale=column.scale, sign="+"), p_value]
+
+
+def interval_text(interval: Interval, *, scale: float = 1.0, sign: str = "") -> str:
+    """Write an estimate and its interval, as `40.0 [16.8, 68.7]`."""
+    low, estimate, high = (scale * value for value in (interval.low, interval.estimate, interval.high))
+    return f"{estimate:{sign}.1f} [{low:{sign}.1f}, {high:{sign}.1f}]"

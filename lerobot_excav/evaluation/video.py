@@ -1,0 +1,35 @@
+"""Writing videos."""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+def write_video(path: Path, frames: Iterable[Image], fps: int, *, crf: int) -> None:
+    """Write pictures as H.264 video, which appears when it is complete.
+
+    Args:
+        path: File to write (mp4); its folder is made.
+        frames: At least one picture, uint8 (H, W, 3), all of one size; an odd last row or column is cut off.
+        fps: Pictures per second.
+        crf: Constant rate factor of x264: 18 is lossless to the eye, 28 coarse.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    with av.open(str(partial), mode="w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(fps))
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": str(crf), "preset": "slow"}
+        for image in frames:
+            height, width = (size - size % 2 for size in image.shape[:2])
+            stream.height, stream.width = height, width
+            even = np.ascontiguousarray(image[:height, :width])
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
+        container.mux(stream.encode(None))
+    partial.replace(path)
