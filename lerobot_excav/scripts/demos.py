@@ -18,7 +18,7 @@ Examples:
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.envs.tasks.registry import task_settings
@@ -39,12 +39,17 @@ class WorkArguments(Arguments):
     resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
 
 
+def default_environment(**settings: Any) -> Any:
+    """Return the first environment, with some settings that differ from its own defaults."""
+    return EnvironmentChoice.get_choice_class(EnvironmentChoice.default_choice_name())(**settings)
+
+
 @dataclass(kw_only=True)
 class DemosArguments(WorkArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
     env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=lambda: EnvironmentChoice.get_choice_class(EnvironmentChoice.default_choice_name())()
+        default_factory=default_environment
     )
     """Environment, with its settings; the excavator by default."""
     out: Path | None = setting("Folder of the dataset; must not exist", default=None)

@@ -21,21 +21,25 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report
 from lerobot_excav.evaluation.report_text import report_text
 from lerobot_excav.evaluation.run import Run
+from lerobot_excav.scripts.arguments import Arguments
 
 
 def _help(text: str) -> dict[str, dict[str, str]]:
     return {"custom_args": {"help": text}}
 
 
-@dataclass
-class ReportArguments:
+@dataclass(kw_only=True)
+class ReportArguments(Arguments):
     """Options of `lerobot-excav report`."""
+
+    POSITIONAL: ClassVar[str] = "metrics"
 
     metrics: list[str] = field(default_factory=list, metadata=_help("[LABEL=]FILE or folder, any number"))
     rows: Path | None = field(default=None, metadata=_help("TOML file of a page, in place of METRICS"))
@@ -137,3 +141,6 @@ def _label_and_path(result: str) -> tuple[str, Path]:
 
 def _default_label(path: Path) -> str:
     return path.resolve().parent.name if path.stem == "metrics" else path.stem
+
+
+ARGUMENTS = ReportArguments

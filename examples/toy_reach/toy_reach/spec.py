@@ -17,7 +17,11 @@ class ReachSettings(TaskSettings):
     task: str = with_default(TaskSettings, "task", "Reach-v0")
     fps: int = with_default(TaskSettings, "fps", 10)
     table: str = setting(
-        "What the table is made of", default="wood", choices=("wood", "ice"), is_column=True, changes_start=True
+        "What the table is made of",
+        default="wood",
+        choices=("wood", "ice"),
+        is_column=True,
+        changes_start=True,
     )
 
 

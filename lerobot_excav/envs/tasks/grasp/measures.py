@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any, override
 
 from lerobot_excav.envs.machines.fr5.layout import NO_BLOCK
-from lerobot_excav.envs.tasks.grasp.task import TASK_STATE_NAMES
+from lerobot_excav.envs.tasks.grasp.spec import TASK_STATE_NAMES
 from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
 
 if TYPE_CHECKING:
