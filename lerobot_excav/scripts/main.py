@@ -53,12 +53,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     name, *rest = arguments
     # Loaded only now, so that help is instant whatever the other commands need.
-    from lerobot_excav.envs.tasks.registry import load_outside_tasks
+    from lerobot_excav.envs.tasks.registry import load_plugins
     from lerobot_excav.scripts.arguments import parse_arguments
 
     command = importlib.import_module(f"lerobot_excav.scripts.{name}")
     try:
-        load_outside_tasks()
+        load_plugins()
         parsed = parse_arguments(command.ARGUMENTS, rest, command=name, description=command.__doc__ or "")
         return int(command.run(parsed))
     except ExcavError as error:

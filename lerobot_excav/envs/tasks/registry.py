@@ -30,9 +30,9 @@ def register_task(spec: TaskSpec) -> None:
     gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
 
 
-def load_outside_tasks() -> None:
-    """Import what installed packages name as entry points of the group `lerobot_excav.tasks`; each registers its tasks."""
-    for entry_point in entry_points(group="lerobot_excav.tasks"):
+def load_plugins() -> None:
+    """Import what installed packages name as entry points of the group `lerobot_excav.plugins`; each registers its tasks."""
+    for entry_point in entry_points(group="lerobot_excav.plugins"):
         entry_point.load()
 
 
