@@ -3,9 +3,9 @@
     python -m bench.policy            # five timed rounds
     python -m bench.policy --quick    # two
 
-Every network reads the same random data: two cameras and a mask of 96 x 128, chunks of 100 actions, batches of 32, on two
-threads. The networks take turns, so that other work on the machine slows all of them alike. LeRobot's ACT reads the mask as
-a third camera, as it does when it is trained on the same dataset.
+Every network reads the same random data: two cameras and a mask of 96 x 128, chunks of 100 actions, batches of 32, on
+two threads. The networks take turns, so that other work on the machine slows all of them alike. LeRobot's ACT reads
+the mask as a third camera, as it does when it is trained on the same dataset.
 """
 
 import argparse
@@ -93,7 +93,9 @@ def take_turns(tasks: dict[str, Task], rounds: int) -> dict[str, float]:
     return {name: statistics.median(times) for name, times in durations.items()}
 
 
-def measure(*, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100) -> None:
+def measure(
+    *, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100
+) -> None:
     """Print the speeds of all policies, one number a line."""
     configs = policy_configs(height=height, width=width, chunk_size=chunk_size)
     policies = {name: get_policy_class(config.type)(config) for name, config in configs.items()}
@@ -107,7 +109,9 @@ def measure(*, rounds: int, batch_size: int = 32, height: int = 96, width: int =
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
-        prog="python -m bench.policy", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m bench.policy",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--quick", action="store_true", help="two rounds in place of five")
     torch.set_num_threads(2)

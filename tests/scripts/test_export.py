@@ -24,10 +24,13 @@ def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp
         assert run(ExportArguments(checkpoint=Path("run"), out=tmp_path / out, **settings)) == 0
     full = CardFacts(title="Grasping", env_type="fr5_grasp", results="98 of 100", license="mit")
     assert asked == [(Path("run"), CardFacts()), (Path("run"), full)]
-    assert f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n" in capsys.readouterr().out
+    assert (
+        f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n"
+        in capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize("checkpoint", [None, Path("no/such/folder")])
 def test_what_is_not_a_checkpoint_is_an_error_that_says_what_to_give(tmp_path, checkpoint):
-    with pytest.raises(ConfigurationError, match="checkpoint.*give the pretrained_model"):
+    with pytest.raises(ConfigurationError, match=r"checkpoint.*give the pretrained_model"):
         run(ExportArguments(checkpoint=checkpoint, out=tmp_path / "small"))

@@ -24,7 +24,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Parameters are stored in half precision (float16: 11 significant bits) and load into a float32 network as usual;
     running statistics stay in float32, they are few and small. The encoder of the variational latent, the optimizer
-    and the training settings, with their local paths, stay behind. `use_vae` is false in the copy, so nothing is
+    and the training settings with their local paths are left out. `use_vae` is false in the copy, so nothing is
     missing when it is loaded; fine-tuning it trains without a latent.
 
     Args:
