@@ -28,14 +28,8 @@ INPUT_FEATURES = {
 OUTPUT_FEATURES = {"action": PolicyFeature(type=FeatureType.ACTION, shape=(4,))}
 
 TINY: dict[str, Any] = {
-    "preset": "fast",
-    "chunk_size": CHUNK,
-    "dim_model": 32,
-    "dim_feedforward": 48,
-    "n_heads": 4,
-    "n_encoder_layers": 1,
-    "device": "cpu",
-    "push_to_hub": False,
+    **{"preset": "fast", "chunk_size": CHUNK, "device": "cpu", "push_to_hub": False},
+    **{"dim_model": 32, "dim_feedforward": 48, "n_heads": 4, "n_encoder_layers": 1},
 }
 
 
@@ -89,10 +83,9 @@ def awake() -> Callable[..., MaskACTPolicy]:
 
     def build(**settings: Any) -> MaskACTPolicy:
         agent = make_policy(**settings)
+        weights = torch.randn(stem(agent).weight[:, 3].shape, generator=torch.Generator().manual_seed(5))
         with torch.no_grad():
-            stem(agent).weight[:, 3] = torch.randn(
-                stem(agent).weight[:, 3].shape, generator=torch.Generator().manual_seed(5)
-            )
+            stem(agent).weight[:, 3] = weights
         return agent
 
     return build
