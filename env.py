@@ -7,7 +7,7 @@ LeRobot downloads it and calls `make_env`; the package itself must be installed 
     envs = make_env("user/repository", n_envs=2, trust_remote_code=True)
     vector_env = envs["excavator"][0]
 
-Where the package is installed, `lerobot-eval --env.type=excavator` needs neither this file nor the Hub.
+`lerobot-eval --env.type=excavator` does the same without the Hub.
 """
 
 from typing import Any
