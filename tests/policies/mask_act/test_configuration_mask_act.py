@@ -34,12 +34,6 @@ def test_every_preset_fills_every_field_that_is_left_open(name):
     assert PRESETS[name].keys() == PRESETS["paper"].keys()
 
 
-def test_a_field_set_by_hand_wins_over_the_preset():
-    config = MaskACTConfig(preset="fast", dim_model=128, use_vae=True, device="cpu")
-    assert (config.dim_model, config.use_vae) == (128, True)
-    assert config.actions_per_token == PRESETS["fast"]["actions_per_token"]
-
-
 def test_a_filled_configuration_does_not_change_its_preset():
     with pytest.raises(ConfigurationError, match=r"preset='paper'.*preset='fast'.*--policy.optimizer_lr"):
         replace(MaskACTConfig(preset="fast", device="cpu"), preset="paper")

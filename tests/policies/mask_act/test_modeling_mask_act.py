@@ -4,18 +4,16 @@ import pytest
 import torch
 import torchvision
 from lerobot.configs.types import FeatureType, PolicyFeature
-from lerobot.policies.factory import get_policy_class
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
-from .conftest import BACKBONES, CAB, MAIN, MASK, STATE, stem, visual
+from .conftest import BACKBONES, MASK, STATE, stem, visual
 
 
-def test_lerobot_finds_the_policy_by_name():
-    assert get_policy_class("mask_act") is MaskACTPolicy
-    # LeRobot's own conformance test reads the annotation as a class.
+def test_the_configuration_is_annotated_with_its_class():
+    # LeRobot's own conformance test reads it.
     assert inspect.signature(MaskACTPolicy.__init__).parameters["config"].annotation is MaskACTConfig
 
 
@@ -68,13 +66,6 @@ def test_the_target_token_sees_the_mask_before_the_stem_does(policy, batch, mask
     assert not torch.equal(token.predict_action_chunk(observation), token.predict_action_chunk(moved))
 
 
-def test_main_camera_decides_which_view_the_mask_joins(awake, batch):
-    for withhold_mask, are_equal in ((False, False), (True, True)):
-        agents = [awake(main_camera=camera, withhold_mask=withhold_mask) for camera in (MAIN, CAB)]
-        plans = [agent.predict_action_chunk(batch()) for agent in agents]
-        assert torch.allclose(*plans, rtol=0, atol=0) == are_equal
-
-
 @pytest.mark.parametrize("use_vae", [False, True])
 def test_forward_leaves_the_batch_alone_and_every_parameter_gets_a_gradient(policy, batch, use_vae):
     agent = policy(use_vae=use_vae, target_token=True).train()
@@ -89,9 +80,9 @@ def test_forward_leaves_the_batch_alone_and_every_parameter_gets_a_gradient(poli
     assert [name for name, p in agent.named_parameters() if p.grad is None] == []
 
 
-def test_training_reads_masks_of_lossy_videos(policy, batch):
+def test_training_cuts_masks_of_lossy_videos_at_one_half(policy, batch):
     agent, data = policy(target_token=True), batch(actions=True)
-    lossy = {**data, MASK: 0.1 + 0.8 * data[MASK]}
+    lossy = {**data, MASK: 0.49 + 0.02 * data[MASK]}
     assert torch.equal(agent.forward(lossy)[0], agent.forward(data)[0])
 
 

@@ -81,21 +81,6 @@ def test_one_query_predicts_actions_per_token_consecutive_actions(policy, batch,
     assert (before != after).any(dim=(0, 2)).tolist() == [True] * per_token + [False] * (8 - per_token)
 
 
-@pytest.mark.parametrize(
-    ("settings", "tokens"),
-    [
-        ({}, 1 + 1 + 2 * 6),
-        ({"target_token": True}, 1 + 1 + 2 * 6 + 1),
-        ({"vision_backbone": "resnet18"}, 2 + 2 * 2),
-    ],
-)
-def test_token_count(policy, batch, settings, tokens):
-    agent, seen = policy(**settings), []
-    agent.model.encoder.register_forward_pre_hook(lambda _, args: seen.append(args[0].shape))
-    agent.predict_action_chunk(batch())
-    assert seen == [(tokens, 3, 32)]
-
-
 def test_views_of_two_sizes_pass_one_by_one(policy, batch):
     data = batch()
     data[CAB] = data[CAB][..., :16, :32]

@@ -1,9 +1,5 @@
 """The gamepad as LeRobot's commands see it."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from lerobot_excav.errors import DeviceError
@@ -13,42 +9,40 @@ from lerobot_excav.teleoperators.excavator_joystick.gamepad import lost
 
 STILL = dict.fromkeys(("swing.vel", "boom.vel", "arm.vel", "bucket.vel"), 0.0)
 
-Connect = Callable[..., ExcavatorJoystick]
-
 
 class StandInPad:
     """A gamepad whose sticks and buttons the test moves."""
 
     name = "Pad"
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.axes = dict.fromkeys(("left_x", "left_y", "right_x", "right_y"), 0.0)
         self.down: set[str] = set()
         self.is_lost = self.is_closed = False
 
-    def open(self, **settings: Any) -> "StandInPad":
+    def open(self, **settings):
         self.settings = settings
         return self
 
-    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+    def read(self):
         if self.is_lost:
             raise lost(self.name)
         return self.axes, {button: button in self.down for button in self.settings["buttons"]}
 
-    def close(self) -> None:
+    def close(self):
         self.is_closed = True
 
 
 @pytest.fixture
-def pad() -> StandInPad:
+def pad():
     return StandInPad()
 
 
 @pytest.fixture
-def connect(pad: StandInPad, tmp_path: Path) -> Connect:
+def connect(pad, tmp_path):
     """Connect a joystick with the given settings to the stand-in."""
 
-    def _connect(**settings: Any) -> ExcavatorJoystick:
+    def _connect(**settings):
         config = ExcavatorJoystickConfig(calibration_dir=tmp_path, **settings)
         teleop = ExcavatorJoystick(config, open_device=pad.open)
         teleop.connect()
@@ -67,19 +61,14 @@ def connect(pad: StandInPad, tmp_path: Path) -> Connect:
         ({"dead_zone": 0.6}, {"swing.vel": 1.0}),
     ],
 )
-def test_sticks_become_commands_and_every_setting_of_the_response_has_an_effect(
-    pad: StandInPad,
-    connect: Connect,
-    settings: dict[str, Any],
-    command: dict[str, float],
-) -> None:
+def test_sticks_become_commands_as_the_settings_say(pad, connect, settings, command):
     pad.axes |= {"left_x": -1.0, "left_y": 0.5}
     action = connect(**{"dead_zone": 0.0, **settings}).get_action()
     assert action == pytest.approx(STILL | command)
     assert list(action) == list(STILL)
 
 
-def test_a_press_is_told_once(pad: StandInPad, connect: Connect) -> None:
+def test_a_press_is_told_once(pad, connect):
     teleop = connect(reinitialise_button="x", next_scene_button="y")
     teleop.get_action()
     pad.down = {"x"}
@@ -89,14 +78,14 @@ def test_a_press_is_told_once(pad: StandInPad, connect: Connect) -> None:
     assert teleop.get_action() == STILL | {"next_scene": 1.0}
 
 
-def test_the_chosen_device_is_opened(pad: StandInPad, connect: Connect) -> None:
+def test_the_chosen_device_is_opened(pad, connect):
     numbers = {"back": 6, "start": 7}
     connect(device_index=2, device_name="pad", joystick_buttons=numbers)
     chosen = {"index": 2, "name": "pad", "buttons": ("back", "start")}
     assert pad.settings == chosen | {"joystick_axes": None, "joystick_buttons": numbers}
 
 
-def test_a_lost_device_never_repeats_its_last_command(pad: StandInPad, connect: Connect) -> None:
+def test_a_lost_device_never_repeats_its_last_command(pad, connect):
     pad.axes["left_x"] = 1.0
     teleop = connect()
     assert teleop.get_action()["swing.vel"] == -1.0
@@ -106,7 +95,7 @@ def test_a_lost_device_never_repeats_its_last_command(pad: StandInPad, connect: 
             teleop.get_action()
 
 
-def test_use_out_of_turn_is_refused(pad: StandInPad, connect: Connect) -> None:
+def test_use_out_of_turn_is_refused(pad, connect):
     teleop = connect()
     with pytest.raises(DeviceError, match="connected already"):
         teleop.connect()

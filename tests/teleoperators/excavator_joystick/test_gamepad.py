@@ -22,7 +22,7 @@ JOYDEVICEREMOVED = 17
 
 
 @pytest.fixture
-def controller() -> SimpleNamespace:
+def controller():
     """SDL's view of a known gamepad: integers by axis name."""
     axes, down = {"LX": 32767, "LY": 0, "RX": 0, "RY": -16384}, {"B7"}
     return SimpleNamespace(
@@ -31,7 +31,7 @@ def controller() -> SimpleNamespace:
 
 
 @pytest.fixture
-def joystick() -> SimpleNamespace:
+def joystick():
     """SDL's view of an unknown joystick: numbered axes."""
     return SimpleNamespace(
         get_name=lambda: "Stick",
@@ -44,7 +44,7 @@ def joystick() -> SimpleNamespace:
 
 
 @pytest.fixture
-def sdl(joystick: SimpleNamespace) -> SimpleNamespace:
+def sdl(joystick):
     """The parts of pygame in use; `queue` holds the events to come."""
     queue: list[Any] = []
     names = {f"CONTROLLER_AXIS_{side}{axis}": side[0] + axis for side in ("LEFT", "RIGHT") for axis in "XY"}
@@ -58,9 +58,7 @@ def sdl(joystick: SimpleNamespace) -> SimpleNamespace:
     )
 
 
-def test_a_known_gamepad_is_read_by_name_until_it_is_unplugged(
-    sdl: SimpleNamespace, controller: SimpleNamespace
-) -> None:
+def test_a_known_gamepad_is_read_by_name_until_it_is_unplugged(sdl, controller):
     pad = KnownGamepad(sdl, controller, BUTTONS)
     axes, buttons = pad.read()
     assert axes == pytest.approx({"left_x": 1.0, "left_y": 0.0, "right_x": 0.0, "right_y": -0.5}, abs=1e-4)
@@ -71,9 +69,7 @@ def test_a_known_gamepad_is_read_by_name_until_it_is_unplugged(
             pad.read()
 
 
-def test_a_plain_joystick_is_read_by_the_given_numbers_until_it_is_unplugged(
-    sdl: SimpleNamespace, joystick: SimpleNamespace
-) -> None:
+def test_a_plain_joystick_is_read_by_the_given_numbers_until_it_is_unplugged(sdl, joystick):
     stick = PlainJoystick(sdl, joystick, *NUMBERS.values())
     sdl.queue.append(SimpleNamespace(type=JOYDEVICEREMOVED, instance_id=7))  # another device
     axes, buttons = stick.read()
@@ -85,12 +81,12 @@ def test_a_plain_joystick_is_read_by_the_given_numbers_until_it_is_unplugged(
             stick.read()
 
 
-def test_numbers_beyond_the_joystick_are_refused(sdl: SimpleNamespace, joystick: SimpleNamespace) -> None:
+def test_numbers_beyond_the_joystick_are_refused(sdl, joystick):
     with pytest.raises(DeviceError, match=r"joystick_axes: \{'right_y': 9\} do not exist; 'Stick' has 5"):
         PlainJoystick(sdl, joystick, AXES | {"right_y": 9}, {"back": 6, "start": 7})
 
 
-def test_devices_are_chosen_by_position_or_by_part_of_the_name() -> None:
+def test_devices_are_chosen_by_position_or_by_part_of_the_name():
     found = ["Left Stick", "Xbox Pad", "Pad 2"]
     assert choose_device(found, index=2, name=None) == 2
     assert choose_device(found, index=0, name="pad") == 1
@@ -109,17 +105,15 @@ def test_devices_are_chosen_by_position_or_by_part_of_the_name() -> None:
         ),
     ],
 )
-def test_a_missing_device_is_described(found: list[str], index: int, name: str | None, message: str) -> None:
+def test_a_missing_device_is_described(found, index, name, message):
     with pytest.raises(DeviceError) as raised:
         choose_device(found, index=index, name=name)
     assert message in str(raised.value)
     assert "--teleop.type=excavator_operator" in str(raised.value)
 
 
-def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(
-    monkeypatch: pytest.MonkeyPatch, sdl: SimpleNamespace, controller: SimpleNamespace
-) -> None:
-    def opened(*, known: bool, numbers: dict[str, Any]) -> gamepad.Gamepad:
+def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(monkeypatch, sdl, controller):
+    def opened(*, known, numbers):
         sdl_controller = SimpleNamespace(is_controller=lambda _: known, Controller=lambda _: controller)
         monkeypatch.setattr(gamepad, "_start_sdl", lambda: (sdl, sdl_controller))
         return open_gamepad(index=0, name=None, buttons=BUTTONS, **numbers)
@@ -131,6 +125,6 @@ def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(
         opened(known=False, numbers=UNNUMBERED)
 
 
-def test_sdl_itself_starts_without_a_screen() -> None:
+def test_sdl_itself_starts_without_a_screen():
     with pytest.raises(DeviceError, match=r"teleop\.device_name='no such pad'"):
         open_gamepad(index=0, name="no such pad", buttons=BUTTONS, **UNNUMBERED)

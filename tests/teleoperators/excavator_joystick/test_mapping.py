@@ -15,7 +15,7 @@ CENTRED = dict.fromkeys(AXES, 0.0)
 
 
 @given(deflections, dead_zones, expos)
-def test_the_response_keeps_range_and_sign(value: float, dead_zone: float, expo: float) -> None:
+def test_the_response_keeps_range_and_sign(value, dead_zone, expo):
     command = respond(value, dead_zone=dead_zone, expo=expo)
     assert abs(command) <= 1.0
     assert command == 0.0 or math.copysign(1.0, command) == math.copysign(1.0, value)
@@ -23,18 +23,14 @@ def test_the_response_keeps_range_and_sign(value: float, dead_zone: float, expo:
 
 
 @given(dead_zones, expos, st.floats(0.0, 1.0))
-def test_nothing_moves_within_the_dead_zone_and_full_deflection_is_full_speed(
-    dead_zone: float, expo: float, share: float
-) -> None:
+def test_nothing_moves_within_the_dead_zone_and_full_deflection_is_full_speed(dead_zone, expo, share):
     values = (share * dead_zone, 1.0, -32768 / 32767)
     commands = [respond(value, dead_zone=dead_zone, expo=expo) for value in values]
     assert commands == [0.0, pytest.approx(1.0), pytest.approx(-1.0)]
 
 
 @given(deflections, dead_zones, expos, st.floats(0.0, 1e-3))
-def test_the_response_has_no_step_and_never_falls(
-    value: float, dead_zone: float, expo: float, more: float
-) -> None:
+def test_the_response_has_no_step_and_never_falls(value, dead_zone, expo, more):
     before, after = (respond(v, dead_zone=dead_zone, expo=expo) for v in (value, value + more))
     steepest = 3.0 / (1.0 - dead_zone)  # of the cubic at full deflection
     assert -1e-12 <= after - before <= steepest * more + 1e-12
@@ -54,12 +50,12 @@ def test_the_response_has_no_step_and_never_falls(
         ("sae", "right_y", "arm", -1),
     ],
 )
-def test_each_axis_drives_one_joint(pattern: str, axis: str, joint: str, sign: int) -> None:
+def test_each_axis_drives_one_joint(pattern, axis, joint, sign):
     command = StickMapping(pattern=pattern).command(CENTRED | {axis: 1.0})
     assert command == dict.fromkeys(("swing", "boom", "arm", "bucket"), 0.0) | {joint: float(sign)}
 
 
-def test_centred_sticks_give_plain_zeros() -> None:
+def test_centred_sticks_give_plain_zeros():
     assert str(StickMapping().command(CENTRED)) == "{'swing': 0.0, 'boom': 0.0, 'arm': 0.0, 'bucket': 0.0}"
 
 
@@ -70,6 +66,6 @@ def test_centred_sticks_give_plain_zeros() -> None:
         ((True, False, True), [False, False, True]),  # held from the start
     ],
 )
-def test_a_held_button_is_one_press(downs: tuple[bool, ...], presses: list[bool]) -> None:
+def test_a_held_button_is_one_press(downs, presses):
     detector = PressDetector()
     assert [detector.pressed("a", is_down=down) for down in downs] == presses
