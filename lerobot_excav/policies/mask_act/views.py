@@ -50,8 +50,8 @@ def require_binary(mask_key: str, mask: Tensor) -> None:
     others = mask[(mask != 0) & (mask != 1) & (mask != 255)]
     require(
         others.numel() == 0,
-        f"{mask_key} holds {others[:1].tolist()} and is not binary; allowed: 0 outside the target and 1 (or 255) on "
-        "it. If these are probabilities or a lossy video, pass mask > 0.5.",
+        f"{mask_key} holds values such as {others[:1].tolist()} and is not binary; allowed: 0 outside the target and 1 "
+        "(or 255) on it. If these are probabilities or a lossy video, pass mask > 0.5.",
     )
 
 
