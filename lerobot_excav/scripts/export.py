@@ -11,32 +11,53 @@ Examples:
       ... with a title, a command to run it, and results in the card
 """
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from lerobot_excav.errors import ConfigurationError
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("checkpoint", type=Path, help="pretrained_model folder of a run of lerobot-train")
-    parser.add_argument("--out", type=Path, required=True, help="folder to write")
-    parser.add_argument("--title", default="mask_act", help="heading of the card (default: mask_act)")
-    parser.add_argument(
-        "--env",
-        default="excavator",
-        help="environment in the card's command, as in --env.type (default: excavator)",
+
+@dataclass(kw_only=True)
+class ExportArguments:
+    """Arguments of `lerobot-excav export`."""
+
+    checkpoint: Path | None = field(
+        default=None, metadata={"custom_args": {"help": "pretrained_model folder of a run of lerobot-train"}}
     )
-    parser.add_argument("--results", type=Path, help="Markdown file for the card's section Evaluation")
-    parser.add_argument("--license", default="apache-2.0", help="licence in the card (default: apache-2.0)")
+    out: Path = field(metadata={"custom_args": {"help": "folder to write"}})
+    title: str = field(default="mask_act", metadata={"custom_args": {"help": "heading of the card"}})
+    env: str = field(
+        default="excavator",
+        metadata={"custom_args": {"help": "environment in the card's command, as in --env.type"}},
+    )
+    results: Path | None = field(
+        default=None, metadata={"custom_args": {"help": "Markdown file for the card's section Evaluation"}}
+    )
+    license: str = field(
+        default="apache-2.0",
+        metadata={"custom_args": {"help": "licence in the card, as the Hugging Face Hub spells it"}},
+    )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Export, and print what was written."""
+def run(arguments: ExportArguments) -> int:
+    """Export, and print what was written.
+
+    Raises:
+        ConfigurationError: The checkpoint is not given, or cannot be exported.
+    """
     from lerobot_excav.policies.mask_act.export import export_checkpoint
     from lerobot_excav.policies.mask_act.model_card import CardFacts
 
-    results = arguments.results.read_text() if arguments.results is not None else ""
+    if arguments.checkpoint is None:
+        raise ConfigurationError(
+            "checkpoint is missing; give the pretrained_model folder of a run of lerobot-train, for example "
+            "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging"
+        )
     facts = CardFacts(
-        title=arguments.title, env_type=arguments.env, results=results, license=arguments.license
+        title=arguments.title,
+        env_type=arguments.env,
+        results=arguments.results.read_text() if arguments.results is not None else "",
+        license=arguments.license,
     )
     out = export_checkpoint(arguments.checkpoint, arguments.out, facts)
     size = sum(file.stat().st_size for file in out.iterdir())

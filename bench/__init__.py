@@ -1,0 +1,1 @@
+"""Measurements of this machine and of the code; each module is run by `python -m bench.NAME`."""
