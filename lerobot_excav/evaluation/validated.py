@@ -25,11 +25,14 @@ def validated[Model: BaseModel](
     try:
         return model.model_validate_json(text)
     except ValidationError as found:
-        raise error(f"{place}: {_reason(found.errors()[0], model)}") from found
+        errors = found.errors()
+        # A misspelt field is unknown and, under its right name, missing: the first says more.
+        first = next((item for item in errors if item["type"] == "extra_forbidden"), errors[0])
+        raise error(f"{place}: {_reason(first, model)}") from found
 
 
 def _reason(error: Mapping[str, Any], model: type[BaseModel]) -> str:
-    """Say in words what pydantic found first."""
+    """Say in words what pydantic found."""
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error["loc"])[1:]
     kind, value, message = error["type"], error["input"], error["msg"]
     if kind == "missing":
@@ -45,6 +48,14 @@ def _reason(error: Mapping[str, Any], model: type[BaseModel]) -> str:
 
 def _part(model: Any, place: tuple[str | int, ...]) -> Any:
     """Return the model at a place within another."""
-    for part in place:
-        model = get_args(model)[0] if isinstance(part, int) else model.model_fields[part].annotation
+    for name in place:
+        if isinstance(name, str):
+            model = _first_model(model.model_fields[name].annotation)
     return model
+
+
+def _first_model(kind: Any) -> Any:
+    """Return the model in a type such as `tuple[Row, ...]` or `Row | None`."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return kind
+    return next((found for part in get_args(kind) if (found := _first_model(part))), None)

@@ -1,29 +1,41 @@
-"""Metrics files of made-up evaluations."""
+"""Metrics files of evaluations, and checkpoints of trainings, that never were."""
 
 import json
+from datetime import datetime, timedelta
 
 import pytest
 
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.run import Run
 
-# How long an example takes says how busy the machine is, not whether the code is right.
 
-
-def line(number, **changes):
+def _shared(number):
     return {
         "episode_ix": number,
         "seed": number,
-        "simulation_version": 2,
-        "task": "Scoop-v0",
         "scene_set": "test",
         "scene_id": number,
         "target_id": number % 4,
+        "commands": [[0, number % 4]],
+        "mask_source": "oracle",
         "mask_condition": "correct",
+        "mask_noise": "none",
+        "mask_noise_px": 0,
+        "target_overlay": False,
+        "mask_missing_frames": 0,
+        "frames": 200,
+        "is_success": True,
+    }
+
+
+def scoop(number, **changes):
+    return {
+        **_shared(number),
+        "simulation_version": 2,
+        "task": "Scoop-v0",
         "soil": "sand",
         "fidelity": "standard",
         "target_success": True,
-        "is_success": True,
         "retained_mass_kg": 300.0,
         "residual_bucket_mass_kg": 1.5,
         "hard_target_contacts": 0,
@@ -35,19 +47,9 @@ def line(number, **changes):
 
 def grasp(number, **changes):
     return {
-        "episode_ix": number,
-        "seed": number,
+        **_shared(number),
         "simulation_version": 1,
         "task": "FR5Grasp-v0",
-        "scene_set": "test",
-        "scene_id": number,
-        "target_id": number % 4,
-        "final_target_id": number % 4,
-        "mask_condition": "correct",
-        "mask_noise": "none",
-        "mask_noise_px": 0,
-        "retarget_frame": None,
-        "is_success": True,
         "episode_return": 800.0,
         "first_grasped_block": number % 4,
         "shown_block": number % 4,
@@ -59,8 +61,8 @@ def grasp(number, **changes):
 
 
 @pytest.fixture
-def metrics_line():
-    return line
+def scoop_line():
+    return scoop
 
 
 @pytest.fixture
@@ -74,6 +76,7 @@ def metrics_file(tmp_path):
 
     def write(name, lines):
         path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("".join(json.dumps(entry) + "\n" for entry in lines))
         return path
 
@@ -89,3 +92,37 @@ def make_run(metrics_file):
         return Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths))
 
     return make
+
+
+@pytest.fixture
+def write_training(tmp_path):
+    """Leave what lerobot-train and a workflow leave: checkpoints at some steps, one every 10 minutes, and the log.
+
+    Returns the last checkpoint.
+    """
+
+    def write(name, *steps, dataset=None):
+        folder, start = tmp_path / "train" / name, datetime(2026, 1, 1, 12, 0, 0)
+        log = [
+            "# commit 0123456789abcdef",
+            "$ lerobot-train --x=1",
+            f"INFO {start} ot_train.py:597 Start offline training on a fixed dataset",
+        ]
+        data = {"root": f"{tmp_path}/data/pairs", "episodes": list(range(200)), "eval_split": 0.1975}
+        config = {
+            "dataset": {"repo_id": "local/x", **data, **(dataset or {})},
+            "batch_size": 16,
+            "seed": 1000,
+        }
+        for number, step in enumerate(steps, 1):
+            checkpoint = folder / "checkpoints" / f"{step:06d}"
+            (checkpoint / "pretrained_model").mkdir(parents=True)
+            (checkpoint / "training_state").mkdir()
+            (checkpoint / "training_state" / "training_step.json").write_text(json.dumps({"step": step}))
+            (checkpoint / "pretrained_model" / "train_config.json").write_text(json.dumps(config))
+            time = start + timedelta(minutes=10 * number)
+            log.append(f"Training: 9%|# | 1/2INFO {time} ot_train.py:687 Checkpoint policy after step {step}")
+        folder.with_name(f"{name}.log").write_text("\n".join(log))
+        return checkpoint
+
+    return write

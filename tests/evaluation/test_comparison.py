@@ -10,13 +10,11 @@ def rng():
     return np.random.default_rng(0)
 
 
-def test_differences_are_paired_by_scene_and_target(make_run, metrics_line, rng):
-    first = make_run(
-        "a", [metrics_line(i, target_success=i < 2, retained_mass_kg=100.0 * i) for i in range(8)]
-    )
+def test_differences_are_paired_by_scene_and_target(make_run, scoop_line, rng):
+    first = make_run("a", [scoop_line(i, target_success=i < 2, retained_mass_kg=100.0 * i) for i in range(8)])
     # The same scenes in another order, each 7 kg better.
     second = make_run(
-        "b", [metrics_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))]
+        "b", [scoop_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))]
     )
     target, full, mass = compare(first, second, rng)
     assert target.difference.estimate == pytest.approx(0.75)
@@ -26,31 +24,32 @@ def test_differences_are_paired_by_scene_and_target(make_run, metrics_line, rng)
     assert mass.p_value is None
 
 
-def test_a_difference_on_all_scenes_is_not_certain(make_run, metrics_line, rng):
-    first = make_run("a", [metrics_line(i) for i in range(4)])
-    second = make_run("b", [metrics_line(i, target_success=False) for i in range(4)])
+def test_a_difference_on_all_scenes_is_not_certain(make_run, scoop_line, rng):
+    first = make_run("a", [scoop_line(i) for i in range(4)])
+    second = make_run("b", [scoop_line(i, target_success=False) for i in range(4)])
     target, *_ = compare(first, second, rng)
     assert (target.difference.estimate, target.difference.low) == (-1.0, -1.0)
     assert target.difference.high == pytest.approx(-0.307, abs=5e-4)
 
 
-def test_several_seeds_have_no_mcnemar_test(make_run, metrics_line, rng):
-    first = make_run("a", [metrics_line(1)], [metrics_line(1)])
-    second = make_run("b", [metrics_line(1)], [metrics_line(1, target_success=False)])
+def test_several_seeds_have_no_mcnemar_test(make_run, scoop_line, rng):
+    first = make_run("a", [scoop_line(1)], [scoop_line(1)])
+    second = make_run("b", [scoop_line(1)], [scoop_line(1, target_success=False)])
     target, *_ = compare(first, second, rng)
     assert target.p_value is None
     assert target.difference.estimate == -0.5
 
 
-def test_runs_on_other_scenes_are_not_compared(make_run, metrics_line, rng):
+def test_runs_on_other_scenes_are_not_compared(make_run, scoop_line, rng):
     with pytest.raises(DatasetError, match=r"a and b differ in 2 scenes and targets \(test/1/1, test/2/2"):
-        compare(make_run("a", [metrics_line(1)]), make_run("b", [metrics_line(2)]), rng)
+        compare(make_run("a", [scoop_line(1)]), make_run("b", [scoop_line(2)]), rng)
 
 
-def test_the_operator_may_have_played_more_scenes_but_not_fewer(make_run, metrics_line):
-    operator = make_run("o", [metrics_line(i, retained_mass_kg=float(i)) for i in range(1, 5)])
-    assert matched(
-        make_run("a", [metrics_line(3), metrics_line(2)]), operator, "retained_mass_kg"
-    ).tolist() == [2.0, 3.0]
+def test_the_operator_may_have_played_more_scenes_but_not_fewer(make_run, scoop_line):
+    operator = make_run("o", [scoop_line(i, retained_mass_kg=float(i)) for i in range(1, 5)])
+    assert matched(make_run("a", [scoop_line(3), scoop_line(2)]), operator, "retained_mass_kg").tolist() == [
+        2.0,
+        3.0,
+    ]
     with pytest.raises(DatasetError, match="lacks 1 scenes"):
-        matched(make_run("b", [metrics_line(9)]), operator, "retained_mass_kg")
+        matched(make_run("b", [scoop_line(9)]), operator, "retained_mass_kg")

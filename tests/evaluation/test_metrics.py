@@ -1,36 +1,31 @@
 import pytest
 
 from lerobot_excav.envs.configs.metrics_log import MetricsLog
+from lerobot_excav.envs.tasks.measures import EpisodeKey
 from lerobot_excav.errors import ConfigurationError, DatasetError
-from lerobot_excav.evaluation.episode import EpisodeKey
 from lerobot_excav.evaluation.metrics import read_evaluation
 
 
-def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, metrics_line):
-    evaluation = read_evaluation(
-        metrics_file("m.jsonl", [metrics_line(3), metrics_line(4, retained_mass_kg=20)])
-    )
+def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, scoop_line):
+    evaluation = read_evaluation(metrics_file("m.jsonl", [scoop_line(3), scoop_line(4, retained_mass_kg=20)]))
     assert list(evaluation.episodes) == [EpisodeKey("test", 3, 3), EpisodeKey("test", 4, 0)]
     assert evaluation.episodes[EpisodeKey("test", 4, 0)].retained_mass_kg == 20.0
-    assert evaluation.operator is None
+    assert (evaluation.task, evaluation.operator, evaluation.seed) == ("Scoop-v0", None, 3)
 
 
-def test_what_the_environment_logs_is_read(tmp_path, metrics_line):
-    log = MetricsLog(tmp_path / "m.jsonl", n_envs=1)
+def test_what_the_environment_logs_is_read_also_by_its_folder(tmp_path, scoop_line):
+    log = MetricsLog(tmp_path / "metrics.jsonl", n_envs=1)
     log.begin_batch([1000])
-    metrics = {k: v for k, v in metrics_line(1000).items() if k not in ("episode_ix", "seed")}
+    metrics = {k: v for k, v in scoop_line(1000).items() if k not in ("episode_ix", "seed")}
     log.finish_episode(0, {"episode_metrics": metrics})
-    assert list(read_evaluation(tmp_path / "m.jsonl").episodes) == [EpisodeKey("test", 1000, 0)]
+    evaluation = read_evaluation(tmp_path)
+    assert evaluation.path == tmp_path / "metrics.jsonl"
+    assert list(evaluation.episodes) == [EpisodeKey("test", 1000, 0)]
 
 
-def test_a_folder_stands_for_the_metrics_file_in_it(metrics_file, metrics_line, tmp_path):
-    metrics_file("metrics.jsonl", [metrics_line(3)])
-    assert read_evaluation(tmp_path).path == tmp_path / "metrics.jsonl"
-
-
-def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, metrics_line):
-    first = [metrics_line(i, retained_mass_kg=1.0) for i in range(3)]
-    second = [metrics_line(i, retained_mass_kg=2.0) for i in range(2)]
+def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, scoop_line):
+    first = [scoop_line(i, retained_mass_kg=1.0) for i in range(3)]
+    second = [scoop_line(i, retained_mass_kg=2.0) for i in range(2)]
     evaluation = read_evaluation(metrics_file("m.jsonl", first + second))
     assert evaluation.of == 2
     assert [episode.retained_mass_kg for episode in evaluation.episodes.values()] == [2.0, 2.0]
@@ -39,43 +34,42 @@ def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, metrics_
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"retained_mass_kg": None}, "retained_mass_kg=None is no float"),
-        ({"target_success": 1}, "target_success=1 is no bool"),
-        ({"scene_id": True}, "scene_id=True is no int"),
-        ({"task": "Clear-v0"}, "task='Clear-v0'"),
-        ({"scene_id": 1, "target_id": 1}, "test/1/1 occur twice"),
+        ({"retained_mass_kg": None}, "retained_mass_kg=None: input should be a valid number"),
+        ({"retained_mass_kg": float("nan")}, "retained_mass_kg=nan: input should be a finite number"),
+        ({"target_success": 1}, "target_success=1: input should be a valid boolean"),
+        ({"scene_id": True}, "scene_id=True: input should be a valid integer"),
+        ({"scene_id": 2.5}, r"scene_id=2\.5: input should be a valid integer"),
+        ({"task": "Dance-v0"}, "task='Dance-v0'"),
+        ({"task": "FR5Grasp-v0"}, "task='FR5Grasp-v0', but the lines before are of 'Scoop-v0'"),
+        ({"scene_id": 1, "target_id": 1, "commands": [[0, 1]]}, "test/1/1 occur twice"),
+        ({"commands": []}, r"commands=\[\] must be pairs of frame and target"),
+        ({"commands": [[0, 3]]}, r"begin with \[0, target_id=2\]"),
+        ({"commands": [[0, 2], [9, 1], [9, 3]]}, "in the order of their frames"),
+        ({"commands": [[0, 2], [9]]}, r"lacks commands\[1\]\[1\]"),
     ],
 )
-def test_a_line_that_cannot_be_used_is_named(metrics_file, metrics_line, changes, message):
-    path = metrics_file("m.jsonl", [metrics_line(1), metrics_line(2, **changes)])
-    with pytest.raises(DatasetError, match=rf"m\.jsonl:2.*{message}"):
+def test_a_line_that_cannot_be_used_is_named(metrics_file, scoop_line, changes, message):
+    path = metrics_file("m.jsonl", [scoop_line(1), scoop_line(2, **changes)])
+    with pytest.raises(DatasetError, match=rf"m\.jsonl:2: .*{message}"):
         read_evaluation(path)
 
 
-def test_a_missing_field_is_named(metrics_file, metrics_line):
-    incomplete = metrics_line(1)
-    del incomplete["spill_before_target_events"]
-    with pytest.raises(DatasetError, match=r"m\.jsonl:1: lacks spill_before_target_events"):
+def test_an_unknown_task_is_refused_with_those_that_are_known(metrics_file, scoop_line):
+    with pytest.raises(DatasetError, match=r"m\.jsonl:1: task='Dance-v0' .* 'Scoop-v0', 'FR5Grasp-v0'"):
+        read_evaluation(metrics_file("m.jsonl", [scoop_line(1, task="Dance-v0")]))
+
+
+@pytest.mark.parametrize("name", ["spill_before_target_events", "commands", "task"])
+def test_a_missing_field_is_named(metrics_file, scoop_line, name):
+    incomplete = scoop_line(1)
+    del incomplete[name]
+    with pytest.raises(DatasetError, match=rf"m\.jsonl:1: lacks {name}"):
         read_evaluation(metrics_file("m.jsonl", [incomplete]))
 
 
-def test_a_file_of_the_first_version_is_read(metrics_file, metrics_line):
-    first = metrics_line(3)
-    del first["simulation_version"], first["fidelity"]
-    (episode,) = read_evaluation(metrics_file("m.jsonl", [first])).episodes.values()
-    assert (episode.simulation_version, episode.fidelity) == (1, "standard")
-
-
-def test_a_file_from_before_there_was_noise_is_of_masks_without(metrics_file, metrics_line):
-    lines = [metrics_line(3), metrics_line(4, mask_noise="shift", mask_noise_px=2)]
-    episodes = [
-        *read_evaluation(metrics_file("old.jsonl", lines[:1])).episodes.values(),
-        *read_evaluation(metrics_file("new.jsonl", lines[1:])).episodes.values(),
-    ]
-    assert [episode.mask for episode in episodes] == ["correct", "correct, shift 2 px"]
-
-
-@pytest.mark.parametrize(("text", "message"), [("", "empty"), ("{", "not JSON"), ("3", "a JSON object")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("", "empty"), ("{", "not JSON"), ("3", "the whole=3: input should be an object")]
+)
 def test_a_damaged_file_is_refused(tmp_path, text, message):
     (tmp_path / "m.jsonl").write_text(text)
     with pytest.raises(DatasetError, match=message):
@@ -87,22 +81,24 @@ def test_a_missing_file_is_refused(tmp_path):
         read_evaluation(tmp_path / "m.jsonl")
 
 
-def test_seeds_of_a_run_must_show_the_same_scenes(make_run, metrics_line):
+def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
     with pytest.raises(ConfigurationError, match="other scenes or targets"):
-        make_run("a", [metrics_line(1)], [metrics_line(2)])
+        make_run("a", [scoop_line(1)], [scoop_line(2)])
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "message"),
     [
-        {"mask_condition": "zero"},
-        {"mask_noise": "erode"},
-        {"mask_noise_px": 2},
-        {"soil": "gravel"},
-        {"fidelity": "fine"},
-        {"simulation_version": 1},
+        ({"mask_source": "detector"}, "mask sources: detector and oracle"),
+        ({"mask_condition": "zero"}, "mask conditions: correct and zero"),
+        ({"mask_noise": "erode"}, "kinds of mask noise: erode and none"),
+        ({"mask_noise_px": 2}, "strengths of mask noise: 0 and 2"),
+        ({"target_overlay": True}, "pictures with and without overlay"),
+        ({"soil": "gravel"}, "soils: gravel and sand"),
+        ({"fidelity": "fine"}, "fidelities: fine and standard"),
+        ({"simulation_version": 1}, "versions of the simulation: 1 and 2"),
     ],
 )
-def test_a_run_does_not_mix_conditions(make_run, metrics_line, changes):
-    with pytest.raises(ConfigurationError, match="mixes mask conditions, kinds of mask noise"):
-        make_run("a", [metrics_line(1), metrics_line(2, **changes)])
+def test_a_run_does_not_mix_conditions(make_run, scoop_line, changes, message):
+    with pytest.raises(ConfigurationError, match=f"a mixes {message}"):
+        make_run("a", [scoop_line(1), scoop_line(2, **changes)])

@@ -12,6 +12,7 @@ from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.operator_run import evaluate_operator
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 
 SETTINGS = DemonstrationSettings(scene_set="test", first_scene=1000, scenes=3, targets=1)
 
@@ -33,7 +34,14 @@ class StillEnv:
             "episode_length": 200,
             "scene_set": "test",
             **self.options,
+            "commands": [[0, self.options["target_id"]]],
+            "mask_source": "oracle",
             "mask_condition": "correct",
+            "mask_noise": "none",
+            "mask_noise_px": 0,
+            "target_overlay": False,
+            "mask_missing_frames": 0,
+            "frames": 1,
             "soil": "sand",
             "fidelity": "standard",
             "target_success": True,
@@ -78,6 +86,7 @@ def test_the_operators_file_is_read_like_that_of_a_policy(tmp_path):
     evaluate(tmp_path / "new" / "operator.jsonl")
     evaluation = read_evaluation(tmp_path / "new" / "operator.jsonl")
     assert evaluation.operator == "scripted"
+    assert EvaluationOrigin.read(evaluation.path).packages["lerobot"]
     # lerobot-eval with seed 1000 shows scene 1000 + i with target (1000 + i) % 4.
     assert [str(key) for key in evaluation.episodes] == ["test/1000/0", "test/1001/1", "test/1002/2"]
 

@@ -1,65 +1,84 @@
 import json
 import shutil
+import sys
 
 import pytest
 
+from lerobot_excav.envs.configs.provenance import write_provenance
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.experiment.stage import Stage
-from lerobot_excav.evaluation.experiment.stage_record import record_path
-from lerobot_excav.evaluation.experiment.stage_run import StageRun, lock_log
-from lerobot_excav.evaluation.provenance import read_provenance
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 
 
 @pytest.fixture
-def training(tmp_path):
-    """A training that can be continued: `training(STEP)` saves a checkpoint."""
-
-    def save(step):
-        checkpoint = tmp_path / "train" / "checkpoints" / str(step)
-        (checkpoint / "pretrained_model").mkdir(parents=True)
-        (checkpoint / "training_state").mkdir()
-        (checkpoint / "training_state" / "training_step.json").write_text(json.dumps({"step": step}))
-        config = {"dataset": {"repo_id": "local/x", "root": None}, "batch_size": 4, "seed": 1}
-        (checkpoint / "pretrained_model" / "train_config.json").write_text(json.dumps(config))
-        last = checkpoint.with_name("last")
-        last.unlink(missing_ok=True)
-        last.symlink_to(str(step))
-
-    return save
-
-
-@pytest.fixture
-def evaluation(training, tmp_path):
+def evaluation(write_training, tmp_path, monkeypatch):
     """Evaluate the checkpoint `last` of 5000 steps; returns the metrics file."""
-    training(5000)
-    makes = tmp_path / "test"
-    path = tmp_path / "train" / "checkpoints" / "last" / "pretrained_model"
-    command = f"mkdir {makes}.partial && touch {makes}.partial/metrics.jsonl && : --policy.path={path}"
-    stage = Stage(name="test", command=command, makes=makes)
-    assert StageRun(stage, {}, lock_log(tmp_path / "test.log", "test"), needs={}).finish()
-    return makes / "metrics.jsonl"
+    last = write_training("mine", 5000).parent / "last"
+    last.symlink_to("005000")
+    monkeypatch.setattr(
+        sys, "argv", ["/bin/lerobot-eval", f"--policy.path={last}/pretrained_model", "--x=a b"]
+    )
+    write_provenance(tmp_path / "metrics.jsonl")
+    return tmp_path / "metrics.jsonl"
 
 
-def test_an_evaluation_keeps_the_training_that_its_policy_had(evaluation, training, tmp_path):
-    training(10000)
-    assert read_provenance(evaluation).training.steps == 5000
+def test_an_evaluation_keeps_its_command_and_the_training_that_its_policy_had(
+    evaluation, write_training, tmp_path
+):
+    newer = write_training("mine", 10000)
+    (newer.parent / "last").unlink()
+    (newer.parent / "last").symlink_to(newer.name)
+    origin = EvaluationOrigin.read(evaluation)
+    last = tmp_path / "train" / "mine" / "checkpoints" / "last"
+    assert origin.command == f"lerobot-eval --policy.path={last}/pretrained_model '--x=a b'"
+    assert origin.packages["lerobot"]
+    assert origin.seconds >= 0.0
+    assert origin.training.steps == 5000
+
+
+def test_a_checkpoint_that_is_gone_leaves_the_training_open(evaluation, tmp_path):
     shutil.rmtree(tmp_path / "train")
-    assert read_provenance(evaluation).training.steps == 5000
+    assert EvaluationOrigin.read(evaluation).training is None
 
 
-def test_a_record_without_a_training_looks_where_its_command_found_the_policy(evaluation, training):
-    path = record_path(evaluation.parent)
-    content = json.loads(path.read_text())
-    del content["training"], content["needs"]
-    path.write_text(json.dumps(content))
-    training(10000)
-    assert read_provenance(evaluation).training.steps == 10000
+def test_without_a_record_nothing_is_known(tmp_path):
+    assert EvaluationOrigin.read(tmp_path / "m.jsonl") == EvaluationOrigin(command=None)
 
 
-def test_a_training_of_another_version_is_named(evaluation):
-    path = record_path(evaluation.parent)
-    content = json.loads(path.read_text())
-    content["training"]["speed"] = 3
-    path.write_text(json.dumps(content))
-    with pytest.raises(DatasetError, match=r"test\.json: its `training` has other entries .*: speed; remove"):
-        read_provenance(evaluation)
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('{"command": "x"', "not JSON"),
+        ('{"x": 1}', "lacks command"),
+        ("3", "the whole=3: input should be an object"),
+        (
+            '{"command": "x", "training": {"speed": 3}}',
+            r"training\.speed is not known; allowed: name, dataset",
+        ),
+        ('{"command": "x", "seconds": "long"}', "seconds='long': input should be a valid number"),
+    ],
+)
+def test_a_file_in_the_place_of_a_record_is_named(tmp_path, content, message):
+    (tmp_path / "m.json").write_text(content)
+    with pytest.raises(DatasetError, match=rf"m\.json: .*{message}"):
+        EvaluationOrigin.read(tmp_path / "m.jsonl")
+
+
+def test_a_record_grows_with_its_file(evaluation):
+    before = json.loads(evaluation.with_suffix(".json").read_text())
+    write_provenance(evaluation)
+    after = json.loads(evaluation.with_suffix(".json").read_text())
+    assert after["started"] == before["started"]
+    assert after["seconds"] >= before["seconds"]
+
+
+@pytest.mark.parametrize("content", ['{"mine": 1}', "{"])
+def test_what_is_not_a_record_is_kept(tmp_path, caplog, content):
+    (tmp_path / "m.json").write_text(content)
+    write_provenance(tmp_path / "m.jsonl")
+    assert (tmp_path / "m.json").read_text() == content
+    assert "m.json is not written" in caplog.text
+
+
+def test_a_record_that_cannot_be_written_stops_nothing(tmp_path, caplog):
+    write_provenance(tmp_path / "none" / "m.jsonl")
+    assert "m.json is not written" in caplog.text

@@ -8,18 +8,18 @@ from lerobot_excav.evaluation.report_text import report_text
 
 
 @pytest.fixture
-def runs(make_run, metrics_line):
+def runs(make_run, scoop_line):
     half = make_run(
-        "half", [metrics_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)]
+        "half", [scoop_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)]
     )
-    full = make_run("full", *[[metrics_line(i, retained_mass_kg=280.0) for i in range(10)]] * 2)
+    full = make_run("full", *[[scoop_line(i, retained_mass_kg=280.0) for i in range(10)]] * 2)
     return [half, full]
 
 
 @pytest.fixture
-def operator(make_run, metrics_line):
+def operator(make_run, scoop_line):
     return make_run(
-        "operator", [metrics_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)]
+        "operator", [scoop_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)]
     )
 
 
@@ -47,13 +47,13 @@ def test_the_text_shows_every_number_with_its_interval(runs, operator):
     assert "operator: scripted" in text
 
 
-def test_a_file_with_several_evaluations_is_noted(make_run, metrics_line):
-    run = make_run("a", [metrics_line(0), metrics_line(0)])
+def test_a_file_with_several_evaluations_is_noted(make_run, scoop_line):
+    run = make_run("a", [scoop_line(0), scoop_line(0)])
     assert "holds 2 evaluations; the last one is used" in report_text(make_report([run]))
 
 
-def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, metrics_line):
-    run = make_run("a", [metrics_line(i, retained_mass_kg=37.0 * i % 11) for i in range(10)])
+def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, scoop_line):
+    run = make_run("a", [scoop_line(i, retained_mass_kg=37.0 * i % 11) for i in range(10)])
     first, second = (make_report([run], seed=seed) for seed in (0, 5))
     assert first.runs[0]["retained_mass_kg"] != second.runs[0]["retained_mass_kg"]
     assert "seed 5" in report_text(second)
@@ -68,26 +68,24 @@ def test_the_report_is_written_as_markdown_and_json(runs, tmp_path):
 
 
 @pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
-def test_runs_whose_scenes_differ_stand_side_by_side_and_are_not_paired(
-    runs, make_run, metrics_line, changes
-):
-    other = make_run("other", [metrics_line(i, **changes) for i in range(10)])
+def test_runs_whose_scenes_differ_stand_side_by_side_and_are_not_paired(runs, make_run, scoop_line, changes):
+    other = make_run("other", [scoop_line(i, **changes) for i in range(10)])
     report = make_report([runs[0], other])
     assert report.differences == {}
     assert "no paired differences to other: half dug sand in version 2" in report_text(report)
 
 
 @pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
-def test_an_operator_of_other_scenes_is_refused(runs, make_run, metrics_line, changes):
-    operator = make_run("operator", [metrics_line(i, **changes) for i in range(12)])
+def test_an_operator_of_other_scenes_is_refused(runs, make_run, scoop_line, changes):
+    operator = make_run("operator", [scoop_line(i, **changes) for i in range(12)])
     with pytest.raises(DatasetError, match=r"half dug sand in version 2 .* and operator dug"):
         make_report(runs[:1], operator=operator)
 
 
-def test_the_text_names_soil_fidelity_and_version(make_run, metrics_line):
-    runs = [make_run(soil, [metrics_line(0, soil=soil)]) for soil in ("sand", "gravel")]
+def test_the_text_names_soil_fidelity_and_version(make_run, scoop_line):
+    runs = [make_run(soil, [scoop_line(0, soil=soil)]) for soil in ("sand", "gravel")]
     text = report_text(make_report(runs))
     assert "| gravel | gravel | correct" in text
     assert "- Simulation: version 2, standard fidelity of the soil." in text
-    runs.append(make_run("fine", [metrics_line(0, fidelity="fine")]))
+    runs.append(make_run("fine", [scoop_line(0, fidelity="fine")]))
     assert "fine: version 2, fine fidelity of the soil" in report_text(make_report(runs))

@@ -1,13 +1,12 @@
 """An experiment that was never run: its metrics, records, checkpoints and logs."""
 
 import json
-from datetime import datetime, timedelta
 
-import av
 import numpy as np
 import pytest
 
 from lerobot_excav.evaluation.result_page.contents import read_contents
+from lerobot_excav.evaluation.video import write_video
 
 ROWS = """
 title = "Does it obey?"
@@ -33,32 +32,6 @@ label = "paired"
 episodes = [0, 1]
 """
 
-START = datetime(2026, 1, 1, 12, 0, 0)
-
-
-@pytest.fixture
-def write_training(tmp_path):
-    """Leave what lerobot-train leaves: checkpoints at some steps, one every 10 minutes, and the log."""
-
-    def write(name, *steps):
-        folder = tmp_path / "train" / name
-        log = [f"INFO {START} ot_train.py:597 Start offline training on a fixed dataset"]
-        for number, step in enumerate(steps, 1):
-            checkpoint = folder / "checkpoints" / f"{step:06d}"
-            (checkpoint / "pretrained_model").mkdir(parents=True)
-            (checkpoint / "training_state").mkdir()
-            (checkpoint / "training_state" / "training_step.json").write_text(json.dumps({"step": step}))
-            dataset = {"root": f"{tmp_path}/data/pairs", "episodes": list(range(200)), "eval_split": 0.1975}
-            config = {"dataset": {"repo_id": "local/x", **dataset}, "batch_size": 16, "seed": 1000}
-            (checkpoint / "pretrained_model" / "train_config.json").write_text(json.dumps(config))
-            time = START + timedelta(minutes=10 * number)
-            log.append(f"Training: 9%|# | 1/2INFO {time} ot_train.py:687 Checkpoint policy after step {step}")
-        folder.with_name(f"{name}.log").write_text("\n".join(log))
-        write_record(folder, "lerobot-train --x=1")
-        return folder
-
-    return write
-
 
 @pytest.fixture
 def read_rows(tmp_path):
@@ -72,50 +45,37 @@ def read_rows(tmp_path):
     return read
 
 
-def write_record(folder, command):
-    record = {
-        "stage": folder.name,
-        "command": command,
-        "environment": {},
-        "commit": "0123456789abcdef0123456789abcdef01234567",
-        "modified": False,
-        "packages": {"lerobot": "0.6.1", "mujoco": "4.0"},
-        "attempts": [{"started": "2026-01-01T12:00:00+00:00", "wall_s": 60.0, "exit_code": 0}],
-    }
-    folder.with_name(f"{folder.name}.json").write_text(json.dumps(record))
-
-
 @pytest.fixture
-def write_evaluation(tmp_path):
-    """Leave what lerobot-eval leaves: a metrics file and, if wanted, videos."""
+def write_evaluation(metrics_file, tmp_path):
+    """Leave what lerobot-eval leaves: metrics, where they come from and, if wanted, videos."""
 
     def write(name, lines, checkpoint, videos=0):
-        folder = tmp_path / name
-        folder.mkdir(parents=True)
-        (folder / "metrics.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-        write_record(folder, f"lerobot-eval --policy.path={checkpoint}/pretrained_model --seed=1000")
+        path = metrics_file(f"{name}/metrics.jsonl", lines)
+        record = {
+            "command": f"lerobot-eval --policy.path={checkpoint}/pretrained_model --seed=1000",
+            "commit": "0123456789abcdef0123456789abcdef01234567",
+            "modified": False,
+            "packages": {"lerobot": "0.6.1", "mujoco": "4.0"},
+            "policy": f"{checkpoint}/pretrained_model",
+        }
+        path.with_suffix(".json").write_text(json.dumps(record))
         for number in range(videos):
-            write_video(folder / "videos" / "fr5_grasp_0" / f"eval_episode_{number}.mp4")
+            write_clip(path.parent / "videos" / "fr5_grasp_0" / f"eval_episode_{number}.mp4")
 
     return write
 
 
-def write_video(path, frames=20, rate=50):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with av.open(str(path), mode="w") as container:
-        stream = container.add_stream("libx264", rate=rate)
-        stream.width, stream.height, stream.pix_fmt = 32, 24, "yuv420p"
-        for number in range(frames):
-            image = np.full((24, 32, 3), 5 * number, dtype=np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode(None))
+def write_clip(path, frames=20, rate=50):
+    """Write a video that brightens by 5 a frame."""
+    write_video(
+        path, [np.full((24, 32, 3), 5 * number, dtype=np.uint8) for number in range(frames)], rate, crf=23
+    )
 
 
 @pytest.fixture
 def finished(write_training, write_evaluation, grasp_line, tmp_path):
     """Run everything but the row `later`; returns what stands on the page."""
-    training = write_training("paired", 1000, 2000)
-    last = training / "checkpoints" / "002000"
+    last = write_training("paired", 1000, 2000)
     failure = {"is_success": False, "episode_return": 3.0, "first_grasped_block": -1}
     good = [grasp_line(i, seed=1000 + i) for i in range(10)]
     zero = [grasp_line(i, seed=1000 + i, mask_condition="zero", **failure) for i in range(5)]
@@ -123,7 +83,7 @@ def finished(write_training, write_evaluation, grasp_line, tmp_path):
     write_evaluation("test/zero", zero, last)
     for step, successes in ((1000, 2), (2000, 4)):
         lines = [grasp_line(i, scene_set="val", is_success=i < successes) for i in range(4)]
-        write_evaluation(f"val/paired/{step:06d}", lines, training / "checkpoints" / f"{step:06d}")
+        write_evaluation(f"val/paired/{step:06d}", lines, last.with_name(f"{step:06d}"))
     return contents(tmp_path)
 
 

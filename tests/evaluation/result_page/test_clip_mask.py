@@ -17,7 +17,7 @@ def masks(make_run, grasp_line):
     return draw
 
 
-def test_the_mask_of_an_episode_is_drawn_anew(masks):
+def test_the_mask_of_an_episode_is_drawn_again(masks):
     (mask,) = masks()
     assert mask.since == 0
     assert mask.pixels.shape == (96, 128)
@@ -35,7 +35,7 @@ def test_conditions_and_noise_are_those_of_the_run(masks):
 
 
 def test_after_a_change_of_the_command_the_new_block_is_marked(masks):
-    first, second = masks(retarget_frame=25, final_target_id=1)
+    first, second = masks(commands=[[0, 3], [25, 1]])
     assert (first.since, second.since) == (0, 25)
     assert np.array_equal(first.pixels, masks()[0].pixels)
     assert not (first.pixels & second.pixels).any()

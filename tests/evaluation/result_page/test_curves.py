@@ -25,9 +25,9 @@ def curve(tmp_path, grasp_line):
 
 def test_points_stand_by_their_step_and_say_what_they_played(curve):
     points = curve(_2000={}, _100={"mask_condition": "correct"}).points
-    assert [(p.step, p.scene_set, p.setting, p.n) for p in points] == [
-        (100, "val", "mask correct", 2),
-        (2000, "val", "mask correct", 2),
+    assert [(p.step, p.scene_set, p.run.setting, p.n) for p in points] == [
+        (100, "val", {"mask": "correct"}, 2),
+        (2000, "val", {"mask": "correct"}, 2),
     ]
 
 

@@ -3,28 +3,29 @@ import pytest
 
 from lerobot_excav.evaluation.result_page import video_grid
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
-from lerobot_excav.evaluation.result_page.video_grid import Clip, framed, read_video, tinted, write_grid
+from lerobot_excav.evaluation.result_page.video_grid import Clip, framed, read_video, write_grid
 
-from .conftest import write_video
+from .conftest import write_clip
 
 
 @pytest.fixture
-def clip(tmp_path):
-    def make(name, *, is_success=True, frames=20, rate=50, marked=(slice(0), slice(0)), since=0):
+def clip(tmp_path, make_run, grasp_line):
+    def make(name, *, outcome=None, frames=20, rate=50, marked=(slice(0), slice(0)), since=0):
         path = tmp_path / f"{name}.mp4"
-        write_video(path, frames=frames, rate=rate)
+        write_clip(path, frames=frames, rate=rate)
         nothing = np.zeros((24, 32), dtype=bool)
         pixels = nothing.copy()
         pixels[marked] = True
         masks = [ShownMask(since=0, pixels=nothing), ShownMask(since=since, pixels=pixels)]
-        return Clip(path=path, masks=masks, is_success=is_success)
+        (episode,) = make_run(name, [grasp_line(0, **(outcome or {}))]).episodes
+        return Clip(path=path, masks=masks, episode=episode)
 
     return make
 
 
 def test_clips_stand_in_rows_at_half_their_rate(clip, tmp_path):
     path = tmp_path / "new" / "grid.mp4"
-    write_grid(path, [[clip("a"), clip("b", is_success=False)], [clip("c", frames=10)]])
+    write_grid(path, [[clip("a"), clip("b")], [clip("c", frames=10)]])
     pictures = list(read_video(path))
     assert len(pictures) == 10  # 20 frames at 50 per second
     assert pictures[0].shape == (2 * 192, 2 * 256, 3)
@@ -42,13 +43,20 @@ def test_clips_of_any_rate_are_shown_in_real_time(clip, tmp_path, rate):
     assert seconds == pytest.approx([tick / 25 for tick in range(25)], abs=1.5 / rate)
 
 
-def test_the_border_tells_success(clip, tmp_path):
-    write_grid(tmp_path / "grid.mp4", [[clip("a"), clip("b", is_success=False)]])
+def test_the_border_tells_success_and_obedience_to_a_wrong_mask(clip, tmp_path):
+    failure = {"is_success": False, "mask_condition": "mismatched", "shown_block": 2}
+    obeyed, ignored = ({**failure, "first_grasped_block": block} for block in (2, 1))
+    dropped = {"is_success": False, "first_grasped_block": 0}
+    write_grid(
+        tmp_path / "grid.mp4",
+        [[clip("a"), clip("b", outcome=obeyed), clip("c", outcome=ignored), clip("d", outcome=dropped)]],
+    )
     picture = next(read_video(tmp_path / "grid.mp4")).astype(int)
-    red, green, _ = picture[100, 1]
-    assert green - red > 50
-    red, green, _ = picture[100, 256 + 1]
-    assert abs(green - red) < 20
+    borders = [picture[100, 256 * number + 1] for number in range(4)]
+    assert borders[0] == pytest.approx(video_grid.SUCCESS_RGB, abs=25)
+    assert borders[1] == pytest.approx(video_grid.OBEYED_RGB, abs=25)
+    assert borders[2] == pytest.approx(video_grid.FAILURE_RGB, abs=25)
+    assert borders[3] == pytest.approx(video_grid.FAILURE_RGB, abs=25)
 
 
 def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
@@ -65,16 +73,15 @@ def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
 
 def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch, caplog):
     tried = []
-    encode = video_grid._encode
-    monkeypatch.setattr(video_grid, "_encode", lambda *a: (tried.append(a[2]), encode(*a)))
+    write = video_grid.write_video
+    monkeypatch.setattr(video_grid, "write_video", lambda *a, crf: (tried.append(crf), write(*a, crf=crf)))
     monkeypatch.setattr(video_grid, "MAX_BYTES", 10)
     write_grid(tmp_path / "grid.mp4", [[clip("a")]])
     assert tried == list(video_grid._QUALITIES)
     assert "bytes, more than 10; show fewer clips, or shorter ones" in caplog.text
 
 
-def test_tinting_and_framing_leave_the_picture_as_it_was():
+def test_framing_leaves_the_picture_as_it_was():
     image = np.full((20, 20, 3), 100, dtype=np.uint8)
-    tinted(image, np.ones((20, 20), dtype=bool))
     framed(image, (0, 0, 0))
     assert (image == 100).all()
