@@ -29,7 +29,7 @@ from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 
 @dataclass(kw_only=True)
 class WorkArguments(Arguments):
-    """How work is spread and continued."""
+    """How work is spread."""
 
     workers: int = setting(
         "Processes that simulate; the result does not depend on it, and 0 works in this process",

@@ -21,13 +21,13 @@ from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import EnvironmentChoice
-from lerobot_excav.scripts.demos import WorkArguments, default_environment, played
+from lerobot_excav.scripts.demos import ResumableArguments, default_environment, played
 
 MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay")
 
 
 @dataclass(kw_only=True)
-class OperatorArguments(WorkArguments, PlayedScenes):
+class OperatorArguments(ResumableArguments, PlayedScenes):
     """Arguments of `lerobot-excav operator`."""
 
     env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
