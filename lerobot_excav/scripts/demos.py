@@ -36,6 +36,19 @@ class WorkArguments(Arguments):
         default=2,
         low=0,
     )
+
+
+@dataclass(kw_only=True)
+class ResumableArguments(WorkArguments):
+    """Work that can be continued."""
+
+    resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
+
+
+@dataclass(kw_only=True)
+class ResumableArguments(WorkArguments):
+    """Work that can be continued."""
+
     resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
 
 
@@ -45,7 +58,7 @@ def default_environment(**settings: Any) -> Any:
 
 
 @dataclass(kw_only=True)
-class DemosArguments(WorkArguments, DemonstrationSettings):
+class DemosArguments(ResumableArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
     env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
