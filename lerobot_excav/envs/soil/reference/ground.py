@@ -23,26 +23,26 @@ def surface(heights: Array, grid: Grid, point: Array) -> tuple[float, Array]:
     corner, share = [], []
     for axis in (0, 1):
         cells = heights.shape[axis]
-        place = float(np.clip((point[axis] - grid[axis]) / grid[2 + axis], 0.0, cells - 1.0))
+        place = float(np.clip((point[axis] - grid.first_m[axis]) / grid.cell_m[axis], 0.0, cells - 1.0))
         first = min(int(place), max(cells - 2, 0))
         corner.append((first, min(first + 1, cells - 1)))
         share.append(place - first)
     along_x, along_y = (np.array([1.0 - s, s]) for s in share)
     patch = heights[np.ix_(*corner)]
     step = np.array([-1.0, 1.0])
-    slopes = np.array([step @ patch @ along_y / grid[2], along_x @ patch @ step / grid[3]])
+    slopes = np.array([step @ patch @ along_y / grid.dx, along_x @ patch @ step / grid.dy])
     return float(along_x @ patch @ along_y), slopes
 
 
 def ground_below(site: Site, point: Array) -> tuple[int, float, Array]:
     """Return what lies below a point (2,), its height [m] and its unit normal (3,)."""
-    x, y, floor, half_x, half_y, _, cos, sin = site.box
-    axes = np.array([[cos, sin], [-sin, cos]])
-    in_box = axes @ (point - np.array([x, y]))
-    half = 0.5 * np.array(site.heights.shape) * site.grid[2:]
-    if abs(in_box[0]) < half_x and abs(in_box[1]) < half_y:
+    box = site.box
+    axes = np.array([[box.cos, box.sin], [-box.sin, box.cos]])
+    in_box = axes @ (point - np.array([box.x, box.y]))
+    half = 0.5 * np.array(site.heights.shape) * site.grid.cell_m
+    if abs(in_box[0]) < box.half_x and abs(in_box[1]) < box.half_y:
         height, slopes = surface(site.box_heights, site.box_grid, in_box)
-        place, height, slopes = TOUCHES_BOX_FLOOR, height + floor, slopes @ axes
+        place, height, slopes = TOUCHES_BOX_FLOOR, height + box.floor_z, slopes @ axes
     elif (np.abs(point) < half).all():
         height, slopes = surface(site.heights, site.grid, point)
         place = TOUCHES_GROUND

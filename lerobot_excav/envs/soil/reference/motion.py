@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, Laws
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
@@ -48,9 +48,9 @@ def advance(
             carry(state, tool, step)
         hit = max(hit, press_pairs(state, memory, laws.parcel, dt))
         if tool.present:
-            press_bucket(state, step, tool, site.grid[2], laws.steel, dt)
+            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt)
         press_ground(state, site, laws.ground, dt)
-        if site.box[3] > 0.0:
+        if site.box.half_x > 0.0:
             press_box(state, len(tool.profile) + 1, site.box, laws.steel, dt)
         integrate(state, dt)
     if tool.present:

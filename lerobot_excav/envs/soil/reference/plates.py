@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.contact import Law
-from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxNumbers, ToolPath
+from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 from lerobot_excav.envs.soil.reference.contact import wall_contact
 
@@ -22,7 +22,7 @@ def bucket_polygons(tool: ToolPath) -> list[Array]:
     return [*shell, right, left]
 
 
-def box_polygons(box: BoxNumbers) -> list[Array]:
+def box_polygons(box: BoxWalls) -> list[Array]:
     """Return the corners (4, 3) of the walls of a container, along its own x and y but at world height."""
     _, _, floor, half_x, half_y, top, _, _ = box
     polygons = []
@@ -75,7 +75,7 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
                 state.shell[i] = OUTSIDE_OF_SHELL
 
 
-def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) -> None:
+def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> None:
     """Add the forces of the walls of the target box on the awake parcels."""
     x, y, _, _, _, _, cos, sin = box
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
