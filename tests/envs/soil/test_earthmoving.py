@@ -21,9 +21,7 @@ TABLE = [
 
 
 @pytest.mark.parametrize(("rake", "failure", "weight", "cohesion", "surcharge", "inertia"), TABLE)
-def test_the_factors_of_sand(
-    rake: float, failure: float, weight: float, cohesion: float, surcharge: float, inertia: float
-) -> None:
+def test_the_factors_of_sand(rake, failure, weight, cohesion, surcharge, inertia):
     angle = failure_angle(math.radians(rake), FRICTION, STEEL)
     factors = earthmoving_factors(math.radians(rake), angle, FRICTION, STEEL)
     assert math.degrees(angle) == pytest.approx(failure, abs=0.1)
@@ -34,7 +32,7 @@ def test_the_factors_of_sand(
 
 
 @pytest.mark.parametrize("rake", [20, 40, 60, 75])
-def test_no_other_failure_angle_needs_less(rake: float) -> None:
+def test_no_other_failure_angle_needs_less(rake):
     best = failure_angle(math.radians(rake), FRICTION, STEEL)
     weights = [
         earthmoving_factors(math.radians(rake), angle, FRICTION, STEEL).weight
@@ -43,11 +41,11 @@ def test_no_other_failure_angle_needs_less(rake: float) -> None:
     assert earthmoving_factors(math.radians(rake), best, FRICTION, STEEL).weight <= min(weights) + 1e-12
 
 
-def test_without_friction_a_vertical_wall_fails_at_45_degrees() -> None:
+def test_without_friction_a_vertical_wall_fails_at_45_degrees():
     assert failure_angle(math.pi / 2, 1e-9, 0.0) == pytest.approx(math.pi / 4, abs=1e-4)
 
 
-def test_a_smooth_vertical_wall_meets_rankine() -> None:
+def test_a_smooth_vertical_wall_meets_rankine():
     angle = failure_angle(math.pi / 2, FRICTION, 0.0)
     passive = math.tan(math.pi / 4 + FRICTION / 2) ** 2
     assert angle == pytest.approx(math.pi / 4 - FRICTION / 2, abs=1e-4)
@@ -56,7 +54,7 @@ def test_a_smooth_vertical_wall_meets_rankine() -> None:
     )
 
 
-def test_the_table_holds_the_same_angles() -> None:
+def test_the_table_holds_the_same_angles():
     table = failure_table(FRICTION, STEEL)
     assert len(table) == 71
     for rake, angle, cohesion, surcharge in table[::14]:

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from bench.soil import BUCKET, tool_at
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil, Tool
-from lerobot_excav.envs.soil.benchmark import BUCKET, TICK_S, tool_at
 from lerobot_excav.envs.soil.relaxation import REST_TAN
 
 TICKS = 120

@@ -7,9 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.height_field import surface_height
-from lerobot_excav.envs.soil.parcels.dynamics import Laws
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site, ground_below, press_ground
-from lerobot_excav.envs.soil.parcels.plates import BoxNumbers
+from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
     TOUCHES_BOX_FLOOR,
@@ -17,21 +16,21 @@ from lerobot_excav.envs.soil.parcels.store import (
     TOUCHES_OUTSIDE,
     State,
 )
-from lerobot_excav.envs.soil.reference import ground as reference
+from validation.soil.reference import ground as reference
 
 RADIUS = 0.045
 DT = 0.001
-BOX: BoxNumbers = (4.2, 0.5, 0.2, 1.0, 0.6, 1.0, math.cos(0.4), math.sin(0.4))
+BOX = BoxWalls(4.2, 0.5, 0.2, 1.0, 0.6, 1.0, math.cos(0.4), math.sin(0.4))
 MakeState, MakeSite = Callable[..., State], Callable[..., Site]
 
 
-def rough(site: MakeSite, rng: np.random.Generator) -> Site:
+def rough(site, rng):
     return site(0.3, rng.uniform(0.0, 0.5, (30, 30)), BOX, rng.uniform(0.0, 0.4, (10, 6)))
 
 
 @given(seed=st.integers(0, 2**16), x=st.floats(-3.5, 5.5), y=st.floats(-3.5, 3.5))
 @settings(max_examples=200, deadline=None)
-def test_the_ground_below_is_that_of_the_reference(site: MakeSite, seed: int, x: float, y: float) -> None:
+def test_the_ground_below_is_that_of_the_reference(site, seed, x, y):
     ground = rough(site, np.random.default_rng(seed))
     place, height, normal = ground_below(ground, x, y)
     expected = reference.ground_below(ground, np.array([x, y]))
@@ -42,9 +41,7 @@ def test_the_ground_below_is_that_of_the_reference(site: MakeSite, seed: int, x:
 
 @given(seed=st.integers(0, 2**16), x=st.floats(-2.85, 2.85), y=st.floats(-2.85, 2.85))
 @settings(max_examples=100, deadline=None)
-def test_height_and_normal_are_those_of_the_sampled_surface(
-    site: MakeSite, seed: int, x: float, y: float
-) -> None:
+def test_height_and_normal_are_those_of_the_sampled_surface(site, seed, x, y):
     """Central differences are exact on a bilinear patch, as long as they stay on it."""
     ground = rough(site, np.random.default_rng(seed))
     x0, y0, dx, dy = ground.grid
@@ -61,7 +58,7 @@ def test_height_and_normal_are_those_of_the_sampled_surface(
         assert -normal[axis] / normal[2] == pytest.approx((higher - lower) / (2 * step), abs=1e-6)
 
 
-def test_the_slope_in_a_turned_box_is_seen_in_the_world(site: MakeSite) -> None:
+def test_the_slope_in_a_turned_box_is_seen_in_the_world(site):
     """The soil rises along the box's own x axis, which points at 0.4 rad in the world."""
     rising = np.repeat(np.linspace(0.0, 0.5, 8)[:, None], 6, axis=1)
     _, _, normal = ground_below(site(box=BOX, box_heights=rising), BOX[0], BOX[1])
@@ -77,15 +74,13 @@ def test_the_slope_in_a_turned_box_is_seen_in_the_world(site: MakeSite) -> None:
         (BOX[0], BOX[1], TOUCHES_BOX_FLOOR),
     ],
 )
-def test_what_lies_below(site: MakeSite, x: float, y: float, place: int) -> None:
+def test_what_lies_below(site, x, y, place):
     assert ground_below(site(box=BOX), x, y)[0] == place
 
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=60, deadline=None)
-def test_the_ground_presses_parcels_as_the_reference_does(
-    random_state: MakeState, site: MakeSite, laws: Laws, seed: int
-) -> None:
+def test_the_ground_presses_parcels_as_the_reference_does(random_state, site, laws, seed):
     rng = np.random.default_rng(seed)
     ground = rough(site, rng)
     state = random_state(rng, 30, [4.5, 3.0, 0.2], centre=(1.0, 0.0, 0.35))
@@ -106,9 +101,7 @@ def test_the_ground_presses_parcels_as_the_reference_does(
         np.testing.assert_array_equal(state.on_ground, twin.on_ground)
 
 
-def test_a_parcel_that_leaves_the_ground_remembers_nothing(
-    make_state: MakeState, site: MakeSite, laws: Laws
-) -> None:
+def test_a_parcel_that_leaves_the_ground_remembers_nothing(make_state, site, laws):
     state = make_state([[0.0, 0.0, 0.04]], velocities=[[1.0, 0.0, 0.0]])
     press_ground(state, site(), 0.0, laws.ground, DT)
     assert state.on_ground[0] == 1
@@ -120,9 +113,7 @@ def test_a_parcel_that_leaves_the_ground_remembers_nothing(
     assert not state.ground_springs.any()
 
 
-def test_rising_ground_lifts_a_parcel_without_speed(
-    make_state: MakeState, site: MakeSite, laws: Laws
-) -> None:
+def test_rising_ground_lifts_a_parcel_without_speed(make_state, site, laws):
     """By a little in each sub-step, up to where the contact itself carries on."""
     state = make_state([[0.0, 0.0, -0.1]])
     heights = []
