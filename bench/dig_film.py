@@ -1,5 +1,9 @@
-"""A film of one scoop: digging and dumping in slow motion, the ways between them in quick motion."""
+"""A film of one scoop: digging and dumping in slow motion, the ways between them in quick motion.
 
+python -m bench.dig_film outputs/dig.mp4
+"""
+
+import sys
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -8,10 +12,10 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
-from lerobot_excav.envs.tasks.settings import TICKS_PER_SECOND
 
 FRAMES_PER_SECOND = 20
 """With one tick to a picture, 2.5 times slower than real time."""
@@ -83,3 +87,9 @@ def _pictures(height: int, width: int) -> Iterator[Image]:
             yield renderer.render("side", soil)
             wait = stride
     renderer.close()
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or not sys.argv[1].endswith(".mp4"):
+        sys.exit("Give one file that ends in .mp4: python -m bench.dig_film outputs/dig.mp4")
+    write_video(Path(sys.argv[1]))

@@ -48,60 +48,48 @@ def total_force_n(rake_deg: float, depth_m: float) -> float:
 
 def run(_: Conditions) -> Result:
     """Push the blade at every rake and depth; the conditions play no part."""
-    forces = {rake: tuple(total_force_n(rake, d) for d in DEPTHS_M) for rake in THEORIES_N}
+    forces = {rake: [total_force_n(rake, d) for d in DEPTHS_M] for rake in THEORIES_N}
     checks = [
-        Check(
-            name=f"force at {rake:.0f}°, {depth} m",
-            value=force,
-            unit="N",
-            low=LOW * min(theories),
-            high=HIGH * max(theories),
-        )
+        Check(f"force at {rake:.0f}°, {depth} m", force, "N", low=low, high=high)
         for rake in THEORIES_N
-        for depth, force, theories in zip(DEPTHS_M, forces[rake], THEORIES_N[rake], strict=True)
+        for depth, force, (low, high) in zip(DEPTHS_M, forces[rake], _gates(rake), strict=True)
     ]
     exponents = [power_law(DEPTHS_M, forces[rake])[1] for rake in THEORIES_N]
     growth = min(b / a for row in forces.values() for a, b in pairwise(row))
-    sweep = [total_force_n(rake, 0.10) for rake in SWEEP_DEG]
-    least_deg = SWEEP_DEG[int(np.argmin(sweep))]
+    least_deg = min(SWEEP_DEG, key=lambda rake: total_force_n(rake, 0.10))
     checks += [
-        Check(name="least growth from depth to depth", value=growth, low=1.0),
-        Check(name="least exponent of the depth", value=min(exponents), low=1.6, high=2.1),
-        Check(name="greatest exponent of the depth", value=max(exponents), low=1.6, high=2.1),
-        Check(name="rake of the least force", value=least_deg, unit="°", low=35.0, high=45.0),
+        Check("least growth from depth to depth", growth, low=1.0),
+        Check("least exponent of the depth", min(exponents), low=1.6, high=2.1),
+        Check("greatest exponent of the depth", max(exponents), low=1.6, high=2.1),
+        Check("rake of the least force", least_deg, "°", low=35.0, high=45.0),
     ]
     return Result(checks=tuple(checks), tables=(_table(forces),), plots=(_plot(forces),))
 
 
-def _table(forces: dict[float, tuple[float, ...]]) -> Table:
+def _gates(rake: float) -> list[tuple[float, float]]:
+    """Return the gate [N] at each depth."""
+    return [(LOW * min(theories), HIGH * max(theories)) for theories in THEORIES_N[rake]]
+
+
+def _table(forces: dict[float, list[float]]) -> Table:
     rows = []
     for rake, row in forces.items():
         cells: list[float | str] = [rake]
         for force, theories in zip(row, THEORIES_N[rake], strict=True):
             cells += [force, " / ".join(f"{value:.0f}" for value in theories)]
         rows.append(tuple(cells))
-    header = ["rake [°]"]
-    for depth in DEPTHS_M:
-        header += [f"{depth} m [N]", "three theories [N]"]
-    return Table(header=tuple(header), rows=tuple(rows))
+    header = [text for depth in DEPTHS_M for text in (f"{depth} m [N]", "three theories [N]")]
+    return Table(("rake [°]", *header), tuple(rows))
 
 
-def _plot(forces: dict[float, tuple[float, ...]]) -> Plot:
-    rakes = tuple(THEORIES_N)
-    curves = []
+def _plot(forces: dict[float, list[float]]) -> Plot:
+    rakes, curves = list(THEORIES_N), []
     for k, depth in enumerate(DEPTHS_M):
-        low = tuple(LOW * min(THEORIES_N[rake][k]) for rake in rakes)
-        high = tuple(HIGH * max(THEORIES_N[rake][k]) for rake in rakes)
-        found = tuple(forces[rake][k] for rake in rakes)
-        curves.append(Series(label=f"gate, {depth} m", x=rakes, y=low, y_high=high, color=k))
-        curves.append(Series(label=f"this soil, {depth} m", x=rakes, y=found, color=k))
-    return Plot(
-        name="blade_force",
-        title="Force on a blade 0.33 m wide",
-        x_label="rake [°]",
-        y_label="force [N]",
-        curves=tuple(curves),
-    )
+        low, high = zip(*(_gates(rake)[k] for rake in rakes), strict=True)
+        found = [forces[rake][k] for rake in rakes]
+        curves.append(Series(f"gate, {depth} m", rakes, low, y_high=high, color=k))
+        curves.append(Series(f"this soil, {depth} m", rakes, found, color=k))
+    return Plot("blade_force", "Force on a blade 0.33 m wide", "rake [°]", "force [N]", tuple(curves))
 
 
 EXPERIMENT = SoilExperiment(

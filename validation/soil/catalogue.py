@@ -16,21 +16,18 @@ from validation.soil import (
 )
 from validation.soil.experiment import SoilExperiment
 
-EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(
-    module.EXPERIMENT
-    for module in (
-        column_collapse,
-        heap,
-        blade_force,
-        earthmoving_factors,
-        operator_cycle,
-        free_fall,
-        ledger,
-        determinism,
-        speed,
-        stall,
-        force_ramp,
-    )
+EXPERIMENTS: tuple[SoilExperiment, ...] = (
+    column_collapse.EXPERIMENT,
+    heap.EXPERIMENT,
+    blade_force.EXPERIMENT,
+    earthmoving_factors.EXPERIMENT,
+    operator_cycle.EXPERIMENT,
+    free_fall.EXPERIMENT,
+    ledger.EXPERIMENT,
+    determinism.EXPERIMENT,
+    speed.EXPERIMENT,
+    stall.EXPERIMENT,
+    force_ramp.EXPERIMENT,
 )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters, relax
 from validation.soil.arrangement import cylinder
 from validation.soil.mass_radius import field_radius, mass_radius
@@ -19,7 +19,6 @@ RADIUS_M = 0.5
 VOLUME_LIMIT_M3 = 0.60
 """Largest column, about 940 parcels at `standard`: all of them may be awake. Taller columns are thinner."""
 
-_TICK_S = 0.02
 _TIME_LIMIT_S = 20.0
 
 
@@ -68,7 +67,7 @@ def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: 
     height = len(points) * soil.parcel_mass_kg / (soil.density_kg_m3 * math.pi * radius**2)
     radii = _radii_until_rest(soil)
     moving = np.flatnonzero(np.abs(radii - radii[-1]) > 0.02 * radii[-1])
-    stop = _TICK_S * (moving[-1] + 2) if len(moving) else 0.0
+    stop = TICK_S * (moving[-1] + 2) if len(moving) else 0.0
     return Collapse(
         aspect=height / radius,
         run_out=float(radii[-1]) / radius - 1.0,
@@ -83,8 +82,8 @@ def _radii_until_rest(soil: Soil) -> NDArray[np.float64]:
     """Step until the soil rests; return the mass radius after every tick."""
     radii: list[float] = []
     before = b""
-    while len(radii) < _TIME_LIMIT_S / _TICK_S:
-        soil.step(_TICK_S)
+    while len(radii) < _TIME_LIMIT_S / TICK_S:
+        soil.step(TICK_S)
         radii.append(mass_radius(soil, MASS_SHARE))
         now = soil.heights_m.tobytes()
         if now == before and len(soil.parcel_positions_w) == 0:

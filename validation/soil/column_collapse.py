@@ -11,9 +11,8 @@ import numpy as np
 
 from validation.soil import column_laws as laws
 from validation.soil.column import Collapse, collapse, sand_with_friction
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Plot, Result, Series, Table
-from validation.soil.tracking import track
 
 FRICTIONS_DEG = (39.0, 30.0)
 LOW_ASPECTS = (0.5, 0.75, 1.0, 1.5)
@@ -67,15 +66,11 @@ def _checks(phi: float, groups: list[list[Collapse]], low: int) -> list[Check]:
     at_one = min(groups, key=lambda runs: abs(_mean(runs, "aspect") - 1.0))
     farther = _mean(at_one, "run_out") / _mean(at_one, "cone_run_out")
     return [
-        Check(name=f"exponent, a ≤ 1.5, {phi:.0f}°", value=low_exponent, low=0.75, high=1.25),
-        Check(name=f"exponent, a ≥ 2, {phi:.0f}°", value=tall_exponent, low=0.3, high=0.7),
-        Check(name=f"prefactor, a ≤ 1.5, {phi:.0f}°", value=prefactor, low=least, high=1.6),
-        Check(name=f"prefactor, a ≥ 2, {phi:.0f}°", value=tall_prefactor, low=least, high=1.6),
-        Check(
-            name=f"run-out over that of the height field alone, a = 1, {phi:.0f}°",
-            value=farther,
-            low=CONE_MARGIN,
-        ),
+        Check(f"exponent, a ≤ 1.5, {phi:.0f}°", low_exponent, low=0.75, high=1.25),
+        Check(f"exponent, a ≥ 2, {phi:.0f}°", tall_exponent, low=0.3, high=0.7),
+        Check(f"prefactor, a ≤ 1.5, {phi:.0f}°", prefactor, low=least, high=1.6),
+        Check(f"prefactor, a ≥ 2, {phi:.0f}°", tall_prefactor, low=least, high=1.6),
+        Check(f"run-out over that of the height field alone, a = 1, {phi:.0f}°", farther, low=CONE_MARGIN),
     ]
 
 
@@ -89,21 +84,10 @@ def _table(found: Found) -> Table:
         for runs in groups:
             a = _mean(runs, "aspect")
             spread = float(np.ptp([one.run_out for one in runs]))
-            rows.append(
-                (
-                    *(
-                        phi,
-                        a,
-                        _mean(runs, "run_out"),
-                        spread,
-                        laws.lube_run_out(a),
-                        laws.lajeunesse_run_out(a),
-                    ),
-                    *(_mean(runs, "cone_run_out"), _mean(runs, "height"), laws.lube_height(a)),
-                    *(laws.lajeunesse_height(a), _mean(runs, "stop_time")),
-                )
-            )
-    return Table(header=header, rows=tuple(rows))
+            run_outs = (_mean(runs, "run_out"), spread, laws.lube_run_out(a), laws.lajeunesse_run_out(a))
+            heights = (_mean(runs, "height"), laws.lube_height(a), laws.lajeunesse_height(a))
+            rows.append((phi, a, *run_outs, _mean(runs, "cone_run_out"), *heights, _mean(runs, "stop_time")))
+    return Table(header, tuple(rows))
 
 
 def _fit_table(found: Found, low: int) -> Table:
@@ -112,19 +96,19 @@ def _fit_table(found: Found, low: int) -> Table:
     )
     published = (("Lube et al. 2004", *laws.LUBE_FIT), ("Lajeunesse et al. 2004", *laws.LAJEUNESSE_FIT))
     header = ("", "prefactor, low", "exponent, low", "prefactor, tall", "exponent, tall")
-    return Table(header=header, rows=(*ours, *published))
+    return Table(header, (*ours, *published))
 
 
 def _plots(found: Found) -> tuple[Plot, Plot]:
-    aspects = tuple(float(a) for a in np.geomspace(0.4, 4.5, 80))
+    aspects = [float(a) for a in np.geomspace(0.4, 4.5, 80)]
     run_out = _published(aspects, laws.lube_run_out, laws.lajeunesse_run_out)
     height = _published(aspects, laws.lube_height, laws.lajeunesse_height)
     for k, (phi, groups) in enumerate(found.items(), 2):
         runs = [one for group in groups for one in group]
         run_out.append(_points(f"this soil, {phi:.0f}°", runs, "run_out", k))
-        cone = tuple(laws.cone_run_out(a, phi) for a in aspects)
+        cone = [laws.cone_run_out(a, phi) for a in aspects]
         run_out.append(
-            Series(label=f"height field alone: cone, {phi:.0f}°", x=aspects, y=cone, style="dashed", color=k)
+            Series(f"height field alone: cone, {phi:.0f}°", aspects, cone, style="dashed", color=k)
         )
         height.append(_points(f"this soil, {phi:.0f}°", runs, "height", k))
     return (
@@ -133,33 +117,24 @@ def _plots(found: Found) -> tuple[Plot, Plot]:
     )
 
 
-def _published(
-    aspects: tuple[float, ...], lube: Callable[[float], float], lajeunesse: Callable[[float], float]
-) -> list[Series]:
+def _published(aspects: list[float], *laws: Callable[[float], float]) -> list[Series]:
     return [
-        Series(label="Lube 2004", x=aspects, y=tuple(map(lube, aspects)), style="line", color=0),
-        Series(label="Lajeunesse 2004", x=aspects, y=tuple(map(lajeunesse, aspects)), style="line", color=1),
+        Series(label, aspects, [law(a) for a in aspects], style="line", color=color)
+        for color, (label, law) in enumerate(zip(("Lube 2004", "Lajeunesse 2004"), laws, strict=True))
     ]
 
 
 def _points(label: str, runs: list[Collapse], name: str, color: int) -> Series:
     return Series(
-        label=label,
-        x=tuple(one.aspect for one in runs),
-        y=tuple(float(getattr(one, name)) for one in runs),
+        label,
+        tuple(one.aspect for one in runs),
+        tuple(float(getattr(one, name)) for one in runs),
         color=color,
     )
 
 
 def _plot(name: str, title: str, y_label: str, curves: list[Series]) -> Plot:
-    return Plot(
-        name=name,
-        title=title,
-        x_label="aspect ratio a = h₀ / r₀",
-        y_label=y_label,
-        curves=tuple(curves),
-        logarithmic=True,
-    )
+    return Plot(name, title, "aspect ratio a = h₀ / r₀", y_label, tuple(curves), logarithmic=True)
 
 
 EXPERIMENT = SoilExperiment(

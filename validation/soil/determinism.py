@@ -7,9 +7,8 @@ import numpy as np
 from bench.soil import cone
 from lerobot_excav.envs.soil import Soil
 from validation.soil.dig_runs import cases, dig, prepared_soil
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
-from validation.soil.tracking import track
 
 
 def trace(soil: Soil, *, quick: bool) -> str:
@@ -38,12 +37,10 @@ def run(conditions: Conditions) -> Result:
         rows.append((preset, fidelity, first, again, other))
     return Result(
         checks=(
-            Check(name="runs with another trace", value=float(different), low=0.0, high=0.0),
-            Check(name="resets with other heights", value=float(unequal), low=0.0, high=0.0),
+            Check("runs with another trace", float(different), low=0.0, high=0.0),
+            Check("resets with other heights", float(unequal), low=0.0, high=0.0),
         ),
-        tables=(
-            Table(header=("soil", "fidelity", "trace", "after a reset", "in another soil"), rows=tuple(rows)),
-        ),
+        tables=(Table(("soil", "fidelity", "trace", "after a reset", "in another soil"), tuple(rows)),),
         remarks=(
             "A trace is the start of a SHA-256 over ledger, parcels and heights after every step; it belongs to one "
             "version of the code and to one kind of processor.",

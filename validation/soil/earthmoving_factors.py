@@ -4,6 +4,7 @@ import math
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
+from validation.soil.blade_force import DEPTHS_M, THEORIES_N, WIDTH_M, blade_sand
 from validation.soil.experiment import Conditions, SoilExperiment
 from validation.soil.results import Check, Plot, Result, Series, Table
 
@@ -21,23 +22,11 @@ FACTORS = (
 )
 """Rake [deg], failure angle [deg], N_gamma, N_c, N_q and N_a at 39 deg, soil on steel 26 deg."""
 
-BLADE_FRICTION_DEG, BLADE_STEEL_DEG, BLADE_DENSITY_KG_M3, BLADE_WIDTH_M = 38.0, 26.6, 1460.0, 0.33
-"""The sand and the blade of Hatamura and Chijiiwa 1977."""
-
-BLADE_DEPTHS_M = (0.05, 0.10, 0.15)
-BLADE_FORCES_N = {
-    30.0: (23.0, 92.0, 207.0),
-    45.0: (23.0, 92.0, 207.0),
-    60.0: (28.0, 113.0, 254.0),
-    75.0: (43.0, 172.0, 387.0),
-    90.0: (92.0, 367.0, 827.0),
-}
-"""Force on that blade by rake [deg], at the depths above."""
-
 
 def blade_force_n(rake_deg: float, depth_m: float, *, density: float, width_m: float) -> float:
-    """Return the force of the equation on a blade in dry sand on level ground [N]."""
-    rake, friction, steel = (math.radians(v) for v in (rake_deg, BLADE_FRICTION_DEG, BLADE_STEEL_DEG))
+    """Return the force [N] of the equation on the blade of T5 in dry sand of some density."""
+    rake, sand = math.radians(rake_deg), blade_sand()
+    friction, steel = sand.friction_angle_rad, sand.steel_friction_angle_rad
     weight = earthmoving_factors(rake, failure_angle(rake, friction, steel), friction, steel).weight
     return density * GRAVITY_M_S2 * depth_m**2 * weight * width_m
 
@@ -49,23 +38,21 @@ def run(_: Conditions) -> Result:
     rakes = tuple(row[0] for row in FACTORS)
     return Result(
         checks=(
-            Check(name="greatest error of a factor", value=100.0 * factor_error, unit="%", high=1.0),
-            Check(name="greatest error of a force", value=100.0 * force_error, unit="%", high=1.0),
-            Check(name="error of the scaling with density, width and depth²", value=_scaling(), high=1e-12),
+            Check("greatest error of a factor", 100.0 * factor_error, "%", high=1.0),
+            Check("greatest error of a force", 100.0 * force_error, "%", high=1.0),
+            Check("error of the scaling with density, width and depth²", _scaling(), high=1e-12),
         ),
         tables=(
-            Table(header=("rake [°]", "β [°]", "N_γ", "N_c", "N_q", "N_a"), rows=factor_rows),
-            Table(
-                header=("rake [°]", *(f"{d} m [N]" for d in BLADE_DEPTHS_M), "tabulated [N]"), rows=force_rows
-            ),
+            Table(("rake [°]", "β [°]", "N_γ", "N_c", "N_q", "N_a"), factor_rows),
+            Table(("rake [°]", *(f"{d} m [N]" for d in DEPTHS_M), "tabulated [N]"), force_rows),
         ),
         plots=(
             Plot(
-                name="earthmoving_factors",
-                title="Factors of the earthmoving equation, 39°",
-                x_label="rake [°]",
-                y_label="factor",
-                curves=tuple(_curves(rakes, factor_rows)),
+                "earthmoving_factors",
+                "Factors of the earthmoving equation, 39°",
+                "rake [°]",
+                "factor",
+                tuple(_curves(rakes, factor_rows)),
             ),
         ),
         remarks=("The tabulated numbers are rounded; half of their last digit is taken off the error.",),
@@ -95,12 +82,10 @@ def _factors() -> tuple[tuple[tuple[float, ...], ...], float]:
 
 def _forces() -> tuple[tuple[tuple[float | str, ...], ...], float]:
     rows: list[tuple[float | str, ...]] = []
-    worst = 0.0
-    for rake_deg, published in BLADE_FORCES_N.items():
-        found = [
-            blade_force_n(rake_deg, d, density=BLADE_DENSITY_KG_M3, width_m=BLADE_WIDTH_M)
-            for d in BLADE_DEPTHS_M
-        ]
+    density, worst = blade_sand().density_kg_m3, 0.0
+    for rake_deg, theories in THEORIES_N.items():
+        published = [plane for plane, *_ in theories]
+        found = [blade_force_n(rake_deg, d, density=density, width_m=WIDTH_M) for d in DEPTHS_M]
         worst = max(worst, *(_error(a, b, 0.5) for a, b in zip(found, published, strict=True)))
         rows.append((rake_deg, *found, " / ".join(f"{value:.0f}" for value in published)))
     return tuple(rows), worst
@@ -120,9 +105,9 @@ def _scaling() -> float:
 def _curves(rakes: tuple[float, ...], rows: tuple[tuple[float, ...], ...]) -> list[Series]:
     curves = []
     for k, name in enumerate(("N_γ", "N_c", "N_q", "N_a")):
-        published = tuple(row[2 + k] for row in FACTORS)
-        curves.append(Series(label=name, x=rakes, y=tuple(row[2 + k] for row in rows), style="line", color=k))
-        curves.append(Series(label=f"{name}, tabulated", x=rakes, y=published, color=k))
+        published, found = ([row[2 + k] for row in table] for table in (FACTORS, rows))
+        curves.append(Series(name, rakes, found, style="line", color=k))
+        curves.append(Series(f"{name}, tabulated", rakes, published, color=k))
     return curves
 
 

@@ -1,9 +1,11 @@
 """What an experiment is: its source, what it measures, its gate, and how it is run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from lerobot_excav.envs.tasks.settings import FIDELITIES, SOILS
+from tqdm import tqdm
+
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS
 from lerobot_excav.errors import require, require_choice
 from validation.soil.results import Check, Result
 
@@ -26,7 +28,7 @@ class Conditions:
     quick: bool = False
 
     def __post_init__(self) -> None:
-        require_choice("--soil", self.preset, SOILS)
+        require_choice("--soil", self.preset, PRESETS)
         require_choice("--fidelity", self.fidelity, FIDELITIES)
         require(len(self.seeds) >= 1, "--seeds is empty; give at least one, as in --seeds=0")
         require(min(self.seeds) >= 0, f"--seeds={self.seeds}; allowed: 0 and above")
@@ -59,3 +61,8 @@ class SoilExperiment:
     def reason(self, check: Check) -> str:
         """Return why a check may miss; empty if nobody has found out."""
         return next((text for start, text in self.reasons.items() if check.name.startswith(start)), "")
+
+
+def track[Item](items: Iterable[Item], label: str) -> Iterator[Item]:
+    """Yield the items of a long series while a bar on a terminal counts them; silent in files and tests."""
+    yield from tqdm(items, desc=label, leave=False, disable=None)

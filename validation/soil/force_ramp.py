@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.soil import BUCKET, tool_at
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Plot, Result, Series, Table
-from validation.soil.tracking import track
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def force_at_n(soil: Soil, depth_m: float, rake_deg: float) -> float:
     soil.reset(np.full(soil.heights_m.shape, GROUND_M))
     edge = np.array([0.0, 0.0, GROUND_M - depth_m])
     # The bucket is new to the soil in this step, so that it cuts nothing before it is weighed.
-    reaction = soil.step(0.02, tool_at(edge, math.radians(rake_deg) - plate, _DRAG_W, 0.0))
+    reaction = soil.step(TICK_S, tool_at(edge, math.radians(rake_deg) - plate, _DRAG_W, 0.0))
     return float(np.linalg.norm(reaction.force_w_n))
 
 
@@ -58,11 +58,9 @@ def run(conditions: Conditions) -> Result:
     contact = max(force_at_n(soil, 1e-4, rake) / float(forces[rake][-1]) for rake in RAKES_DEG)
     return Result(
         checks=(
-            Check(name="force above the surface", value=above, unit="N", low=0.0, high=0.0),
-            Check(
-                name="force 0.1 mm below it, share of that at 0.4 m", value=contact, high=1e-3 * JUMP_PER_M
-            ),
-            Check(name="steepest rise, share of that at 0.4 m", value=steepest, unit="1/m", high=JUMP_PER_M),
+            Check("force above the surface", above, "N", low=0.0, high=0.0),
+            Check("force 0.1 mm below it, share of that at 0.4 m", contact, high=1e-3 * JUMP_PER_M),
+            Check("steepest rise, share of that at 0.4 m", steepest, "1/m", high=JUMP_PER_M),
         ),
         tables=(_table(soil),),
         plots=(_plot(depths, forces),),
@@ -72,21 +70,17 @@ def run(conditions: Conditions) -> Result:
 def _table(soil: Soil) -> Table:
     depths = (0.05, 0.1, 0.2, 0.3, 0.4)
     rows = tuple((rake, *(force_at_n(soil, d, rake) for d in depths)) for rake in RAKES_DEG)
-    return Table(header=("rake [°]", *(f"{d} m [N]" for d in depths)), rows=rows)
+    return Table(("rake [°]", *(f"{d} m [N]" for d in depths)), rows)
 
 
 def _plot(depths: Array, forces: dict[float, Array]) -> Plot:
-    x = tuple(map(float, depths))
-    curves = (
-        Series(label=f"rake {rake:.0f}°", x=x, y=tuple(map(float, force)), style="line")
-        for rake, force in forces.items()
-    )
+    curves = (Series(f"rake {rake:.0f}°", depths, force, style="line") for rake, force in forces.items())
     return Plot(
-        name="force_ramp",
-        title="Force on a bucket that is dragged level",
-        x_label="depth of the cutting edge [m]",
-        y_label="force [N]",
-        curves=tuple(curves),
+        "force_ramp",
+        "Force on a bucket that is dragged level",
+        "depth of the cutting edge [m]",
+        "force [N]",
+        tuple(curves),
     )
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Plot, Result, Series, Table
-from validation.soil.tracking import track
 
 Array = NDArray[np.float64]
 
@@ -118,36 +118,35 @@ def _flank_deg(soil: Soil, azimuth_rad: float, radius_m: float) -> float:
     return -math.degrees(math.atan(np.polyfit(radii[flank], soil.heights_m[flank], 1)[0]))
 
 
-def _heights(soil: Soil, azimuth_rad: float, radii_m: Array) -> Array:
-    direction = np.array([math.cos(azimuth_rad), math.sin(azimuth_rad)])
-    return soil.height_at(radii_m[:, None] * direction)
-
-
 def _profile(soil: Soil, reach_m: float) -> Array:
     radii = np.asarray(np.linspace(0.0, reach_m, 60), dtype=np.float64)
-    return np.stack([radii, np.mean([_heights(soil, a, radii) for a in AZIMUTHS_RAD], axis=0)])
+    directions = np.stack([np.cos(AZIMUTHS_RAD), np.sin(AZIMUTHS_RAD)], axis=1)
+    return np.stack([radii, soil.height_at(directions[:, None] * radii[:, None]).mean(axis=0)])
 
 
 def run(conditions: Conditions) -> Result:
     """Pour a heap of every soil; of sand also with half the time step."""
     seeds = conditions.seeds[:1] if conditions.quick else conditions.seeds
-    cases = [(preset, 0.02) for preset in ((conditions.preset,) if conditions.quick else PRESETS)]
+    cases = [(preset, TICK_S) for preset in ((conditions.preset,) if conditions.quick else PRESETS)]
     if not conditions.quick:
-        cases.append(("sand", 0.01))
+        cases.append(("sand", 0.5 * TICK_S))
     checks: list[Check] = []
     rows: list[tuple[float | str, ...]] = []
     profiles = []
     for preset, dt_s in track(cases, "T3 heaps"):
         heaps = [pour_heap(preset, fidelity=conditions.fidelity, seed=s, dt_s=dt_s) for s in seeds]
-        label = preset if dt_s == 0.02 else f"{preset}, {dt_s} s per step"
+        label = preset if dt_s == TICK_S else f"{preset}, {dt_s} s per step"
         checks += _checks(label, heaps)
-        rows += [_row(label, seed, heap) for seed, heap in zip(seeds, heaps, strict=True)]
-        if dt_s == 0.02:
+        rows += [
+            (label, float(s), h.repose_deg, *map(float, h.angles_deg), h.height_m, h.cone_height_m)
+            for s, h in zip(seeds, heaps, strict=True)
+        ]
+        if dt_s == TICK_S:
             profiles.append(heaps[0])
     header = ("soil", "seed", "repose [°]", *(f"{45 * k}°" for k in range(8)), "height [m]", "ideal cone [m]")
     return Result(
         checks=tuple(checks),
-        tables=(Table(header=header, rows=tuple(rows)),),
+        tables=(Table(header, tuple(rows)),),
         plots=(_plot(profiles),),
         remarks=("The table has every pour by itself: its flanks are lumpy by the size of a parcel.",),
     )
@@ -158,32 +157,26 @@ def _checks(label: str, heaps: list[Heap]) -> list[Check]:
     low, high = heaps[0].repose_deg - 2.0, heaps[0].repose_deg + 2.0
     error = max(abs(heap.mass_error) for heap in heaps)
     return [
-        Check(name=f"gentlest flank, {label}", value=float(angles.min()), unit="°", low=low, high=high),
-        Check(name=f"steepest flank, {label}", value=float(angles.max()), unit="°", low=low, high=high),
-        Check(name=f"mass error, {label}", value=error, high=1e-9),
+        Check(f"gentlest flank, {label}", float(angles.min()), "°", low=low, high=high),
+        Check(f"steepest flank, {label}", float(angles.max()), "°", low=low, high=high),
+        Check(f"mass error, {label}", error, high=1e-9),
     ]
-
-
-def _row(label: str, seed: int, heap: Heap) -> tuple[float | str, ...]:
-    angles = [float(a) for a in heap.angles_deg]
-    return (label, float(seed), heap.repose_deg, *angles, heap.height_m, heap.cone_height_m)
 
 
 def _plot(heaps: list[Heap]) -> Plot:
     curves = []
     for k, heap in enumerate(heaps):
-        radii, heights = (tuple(float(v) for v in row) for row in heap.profile_m)
-        slope = math.tan(math.radians(heap.repose_deg))
-        cone = tuple(max(0.0, heap.cone_height_m - slope * r) for r in radii)
-        curves.append(Series(label=heap.preset, x=radii, y=heights, style="line", color=k))
+        radii, heights = heap.profile_m
+        cone = np.maximum(0.0, heap.cone_height_m - math.tan(math.radians(heap.repose_deg)) * radii)
+        curves.append(Series(heap.preset, radii, heights, style="line", color=k))
         label = f"cone at {heap.repose_deg:.0f}°"
-        curves.append(Series(label=label, x=radii, y=cone, style="dashed", color=k))
+        curves.append(Series(label, radii, cone, style="dashed", color=k))
     return Plot(
-        name="heap",
-        title="A heap of 485 kg, mean of 8 azimuths",
-        x_label="distance from the axis [m]",
-        y_label="height [m]",
-        curves=tuple(curves),
+        "heap",
+        "A heap of 485 kg, mean of 8 azimuths",
+        "distance from the axis [m]",
+        "height [m]",
+        tuple(curves),
     )
 
 

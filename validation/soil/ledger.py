@@ -3,9 +3,8 @@
 import math
 
 from validation.soil.dig_runs import cases, dig, prepared_soil
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
-from validation.soil.tracking import track
 
 TOLERANCE_KG = 1e-6
 
@@ -27,11 +26,11 @@ def run(conditions: Conditions) -> Result:
     header = ("soil", "fidelity", "total [kg]", "error [kg]", *(f"{name} [kg]" for name in soil.ledger_kg()))
     return Result(
         checks=(
-            Check(name="greatest error of the sum", value=worst, unit="kg", high=TOLERANCE_KG),
-            Check(name="smallest entry", value=least, unit="kg", low=0.0),
-            Check(name="lowest column", value=lowest, unit="m", low=0.0),
+            Check("greatest error of the sum", worst, "kg", high=TOLERANCE_KG),
+            Check("smallest entry", least, "kg", low=0.0),
+            Check("lowest column", lowest, "m", low=0.0),
         ),
-        tables=(Table(header=header, rows=tuple(rows)),),
+        tables=(Table(header, tuple(rows)),),
     )
 
 

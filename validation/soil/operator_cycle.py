@@ -5,9 +5,8 @@ import numpy as np
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.rig import ExcavatorRig
 from lerobot_excav.datasets.record.simulation import play_demonstration
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
-from validation.soil.tracking import track
 
 RETAINED_KG = (420.0, 550.0)
 """485 +- 65 kg: mean and spread of a person's cycles."""
@@ -35,14 +34,9 @@ def run(conditions: Conditions) -> Result:
     masses = [float(row[2]) for row in rows]
     low, high = RETAINED_KG
     return Result(
-        checks=(
-            Check(name="mean retained mass", value=float(np.mean(masses)), unit="kg", low=low, high=high),
-        ),
+        checks=(Check("mean retained mass", float(np.mean(masses)), "kg", low=low, high=high),),
         tables=(
-            Table(
-                header=("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"),
-                rows=tuple(rows),
-            ),
+            Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),
         ),
         remarks=(
             f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",

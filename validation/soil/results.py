@@ -4,10 +4,12 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from numpy.typing import ArrayLike
+
 Style = Literal["line", "dashed", "points"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Check:
     """One measured value and its gate.
 
@@ -49,7 +51,7 @@ class Check:
         return f"{number_text(self.low)} to {number_text(self.high)}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Table:
     """Values without a gate.
 
@@ -62,28 +64,28 @@ class Table:
     rows: tuple[tuple[float | str, ...], ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Series:
-    """One curve of a plot.
+    """One series of values of a plot.
 
     Attributes:
         label: Its entry in the legend.
         x: Abscissae.
         y: Ordinates.
         style: How it is drawn.
-        y_high: Upper end of a band that starts at `y`; None for a curve.
+        y_high: Upper end of a band that starts at `y`; None for points and curves.
         color: Index of its colour, so that theory and measurement of one thing look alike; None for the next one.
     """
 
     label: str
-    x: tuple[float, ...]
-    y: tuple[float, ...]
+    x: ArrayLike
+    y: ArrayLike
     style: Style = "points"
-    y_high: tuple[float, ...] | None = None
+    y_high: ArrayLike | None = None
     color: int | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Plot:
     """One picture of the report.
 

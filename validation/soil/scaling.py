@@ -1,6 +1,7 @@
 """How the time of a step grows with the number of awake parcels and with the number of cells."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,22 +50,46 @@ def parcel_scaling(preset: str, fidelity: str, seed: int, *, quick: bool = False
         preset: Soil.
         fidelity: Numerical effort.
         seed: Seed of their arrangement.
-        quick: Whether to take fewer sizes.
+        quick: Whether to take fewer sizes, once each.
     """
     counts = [count for count in _COUNTS if count <= FIDELITIES[fidelity].most_awake]
-    _column(preset, fidelity, seed, counts[0], 1)  # compiles or loads the kernels
-    repeats = 1 if quick else _REPEATS
-    return [_column(preset, fidelity, seed, count, repeats) for count in (counts[::2] if quick else counts)]
+
+    def fall(count: int) -> tuple[Array, float]:
+        soil = Soil(preset, fidelity=fidelity, seed=seed)
+        bulk_m3 = count * soil.parcel_mass_kg / soil.density_kg_m3
+        radius_m = (1.2 * bulk_m3 / (math.pi * _SLENDERNESS)) ** (1.0 / 3.0)
+        points = cylinder(radius_m, 2.0 * _SLENDERNESS * radius_m, soil, np.random.default_rng(seed))
+        lowest = points[np.argsort(points[:, 2], kind="stable")][:count]
+        soil.add_parcels(lowest, np.zeros_like(lowest))
+        times, _, awake = timed_steps(soil, [None] * _TICKS.stop)
+        return times[_TICKS], float(awake[_TICKS].mean())
+
+    return _quickest(fall, counts[::2] if quick else counts, 1 if quick else _REPEATS)
 
 
 def grid_scaling(preset: str, fidelity: str, seed: int, *, quick: bool = False) -> list[StepTime]:
-    """Time a dig cycle on the same dig area with more and more cells.
+    """Time a dig cycle on the same dig area with more and more cells; arguments as in `parcel_scaling`."""
 
-    Arguments are those of `parcel_scaling`.
-    """
-    repeats = 1 if quick else _REPEATS
-    _dig(preset, fidelity, seed, _CELLS[0], 1)
-    return [_dig(preset, fidelity, seed, cells, repeats) for cells in (_CELLS[::3] if quick else _CELLS)]
+    def dig(cells: int) -> tuple[Array, float]:
+        size_m = _EXTENT_M / cells
+        soil = Soil(preset, cell_size_m=size_m, fidelity=fidelity, seed=seed, container=TARGET_BOX)
+        soil.reset(cone(soil))
+        return timed_steps(soil, list(dig_cycle()))[0], float(cells)
+
+    return _quickest(dig, _CELLS[::3] if quick else _CELLS, 1 if quick else _REPEATS)
+
+
+def _quickest(
+    run: Callable[[int], tuple[Array, float]], sizes: Sequence[int], repeats: int
+) -> list[StepTime]:
+    """Run every size some times and take the quickest run of every step."""
+    run(sizes[0])  # compiles or loads the kernels
+    found = []
+    for size in sizes:
+        runs = [run(size) for _ in range(repeats)]
+        times = np.min([times for times, _ in runs], axis=0)
+        found.append(StepTime(runs[0][1], float(times.mean()), float(np.percentile(times, 95))))
+    return found
 
 
 def scaling_plots(conditions: Conditions) -> tuple[Plot, Plot]:
@@ -72,63 +97,25 @@ def scaling_plots(conditions: Conditions) -> tuple[Plot, Plot]:
     preset, seed, quick = conditions.preset, conditions.seeds[0], conditions.quick
     parcels = {name: parcel_scaling(preset, name, seed, quick=quick) for name in FIDELITIES}
     cells = {conditions.fidelity: grid_scaling(preset, conditions.fidelity, seed, quick=quick)}
+    title, y_label = (
+        "Step time and awake parcels, each fidelity up to its bound",
+        "computing time of a step [ms]",
+    )
+    across = "cells along each side of the dig area"
     return (
+        Plot("scaling", title, "awake parcels", y_label, _curves(parcels)),
         Plot(
-            name="scaling",
-            title="Step time and awake parcels, each fidelity up to its bound",
-            x_label="awake parcels",
-            y_label="computing time of a step [ms]",
-            curves=_curves(parcels),
-        ),
-        Plot(
-            name="scaling_grid",
-            title="Mean step time of a dig cycle and size of the grid",
-            x_label="cells along each side of the dig area",
-            y_label="computing time of a step [ms]",
-            curves=_curves(cells),
+            "scaling_grid",
+            "Mean step time of a dig cycle and size of the grid",
+            across,
+            y_label,
+            _curves(cells),
         ),
     )
 
 
 def _curves(series: dict[str, list[StepTime]]) -> tuple[Series, ...]:
     return tuple(
-        Series(
-            label=name,
-            x=tuple(time.size for time in times),
-            y=tuple(time.mean_ms for time in times),
-            style="line",
-        )
+        Series(name, [time.size for time in times], [time.mean_ms for time in times], style="line")
         for name, times in series.items()
     )
-
-
-def _column(preset: str, fidelity: str, seed: int, count: int, repeats: int) -> StepTime:
-    soil = Soil(preset, fidelity=fidelity, seed=seed)
-    bulk_m3 = count * soil.parcel_mass_kg / soil.density_kg_m3
-    radius_m = (1.2 * bulk_m3 / (math.pi * _SLENDERNESS)) ** (1.0 / 3.0)
-    points = cylinder(radius_m, 2.0 * _SLENDERNESS * radius_m, soil, np.random.default_rng(seed))
-    lowest = points[np.argsort(points[:, 2], kind="stable")][:count]
-
-    def run() -> tuple[Array, Array]:
-        soil.reset()
-        soil.add_parcels(lowest, np.zeros_like(lowest))
-        times, _, awake = timed_steps(soil, [None] * _TICKS.stop)
-        return times[_TICKS], awake[_TICKS]
-
-    runs = [run() for _ in range(repeats)]
-    return _summary(float(runs[0][1].mean()), [times for times, _ in runs])
-
-
-def _dig(preset: str, fidelity: str, seed: int, cells: int, repeats: int) -> StepTime:
-    soil = Soil(preset, cell_size_m=_EXTENT_M / cells, fidelity=fidelity, seed=seed, container=TARGET_BOX)
-    runs = []
-    for _ in range(repeats):
-        soil.reset(cone(soil))
-        runs.append(timed_steps(soil, list(dig_cycle()))[0])
-    return _summary(float(cells), runs)
-
-
-def _summary(size: float, runs_ms: list[Array]) -> StepTime:
-    """Take the quickest run of every step."""
-    times = np.min(runs_ms, axis=0)
-    return StepTime(size, float(times.mean()), float(np.percentile(times, 95)))

@@ -2,15 +2,14 @@
 
 import os
 import platform
-import time
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.soil import dig_cycle
+from bench.soil import dig_cycle, timed_steps
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.soil import Soil, Tool
+from lerobot_excav.envs.soil import Soil
 from validation.soil.arrangement import cylinder
 from validation.soil.dig_runs import prepared_soil
 from validation.soil.experiment import Conditions, SoilExperiment
@@ -39,20 +38,10 @@ def run(conditions: Conditions) -> Result:
     carry = times[CARRY_TICKS]
     return Result(
         checks=(
-            Check(
-                name="real time over the mean step",
-                value=1e3 * TICK_S / float(times.mean()),
-                unit="×",
-                low=10.0,
-            ),
-            Check(name="95 % of the steps of a cycle", value=_percentile(times, 95), unit="ms", high=10.0),
-            Check(name="half of the steps while carrying", value=_percentile(carry, 50), unit="ms", high=1.0),
-            Check(
-                name=f"95 % of the steps with {awake_in_crowd}",
-                value=_percentile(crowd, 95),
-                unit="ms",
-                high=10.0,
-            ),
+            Check("real time over the mean step", 1e3 * TICK_S / float(times.mean()), "×", low=10.0),
+            Check("95 % of the steps of a cycle", _percentile(times, 95), "ms", high=10.0),
+            Check("half of the steps while carrying", _percentile(carry, 50), "ms", high=1.0),
+            Check(f"95 % of the steps with {awake_in_crowd}", _percentile(crowd, 95), "ms", high=10.0),
         ),
         tables=(_table({"cycle": times, "carrying": carry, awake_in_crowd: crowd}),),
         plots=(_plot(times, awake), *scaling_plots(conditions)),
@@ -76,34 +65,21 @@ def _quickest(
     return np.min(times, axis=0), awake[0]
 
 
-def _timed_step(soil: Soil, tool: Tool | None) -> float:
-    start = time.perf_counter()
-    soil.step(TICK_S, tool)
-    return 1e3 * (time.perf_counter() - start)
-
-
 def _cycle(conditions: Conditions) -> tuple[Array, Array]:
     """Return the time [ms] of every step of the dig cycle, and how many parcels were awake after it."""
     soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
-    times, awake = [], []
-    for tool in dig_cycle():
-        times.append(_timed_step(soil, tool))
-        awake.append(soil.awake_parcel_count)
-    return np.array(times), np.array(awake, dtype=np.float64)
+    times, _, awake = timed_steps(soil, list(dig_cycle()))
+    return times, awake
 
 
 def _crowd(conditions: Conditions) -> tuple[Array, Array]:
     """Return the times [ms] of the first steps of a column of parcels, and how many were awake after them."""
     soil = Soil(conditions.preset, (6.0, 6.0), 0.05, conditions.fidelity, conditions.seeds[0])
-    rng = np.random.default_rng(conditions.seeds[0])
-    points = cylinder(0.45, 1.3, soil, rng)
+    points = cylinder(0.45, 1.3, soil, np.random.default_rng(conditions.seeds[0]))
     points = points[np.argsort(points[:, 2], kind="stable")][:MANY_PARCELS]
     soil.add_parcels(points, np.zeros_like(points))
-    times, awake = [], []
-    for _ in range(_FALL_TICKS):
-        times.append(_timed_step(soil, None))
-        awake.append(soil.awake_parcel_count)
-    return np.array(times), np.array(awake, dtype=np.float64)
+    times, _, awake = timed_steps(soil, [None] * _FALL_TICKS)
+    return times, awake
 
 
 def _table(times: dict[str, Array]) -> Table:
@@ -111,19 +87,19 @@ def _table(times: dict[str, Array]) -> Table:
         (name, float(t.mean()), _percentile(t, 50), _percentile(t, 95), float(t.max()))
         for name, t in times.items()
     ]
-    return Table(header=("steps", "mean [ms]", "50 % [ms]", "95 % [ms]", "worst [ms]"), rows=tuple(rows))
+    return Table(("steps", "mean [ms]", "50 % [ms]", "95 % [ms]", "worst [ms]"), tuple(rows))
 
 
 def _plot(times: Array, awake: Array) -> Plot:
-    seconds = tuple(float(v) for v in TICK_S * np.arange(1, len(times) + 1))
+    seconds = TICK_S * np.arange(1, len(times) + 1)
     return Plot(
-        name="step_times",
-        title="Step times of a dig cycle",
-        x_label="time in the cycle [s]",
-        y_label="computing time [ms]; awake parcels / 100",
-        curves=(
-            Series(label="computing time of a step [ms]", x=seconds, y=tuple(map(float, times)), style="line"),
-            Series(label="awake parcels / 100", x=seconds, y=tuple(map(float, awake / 100.0)), style="line"),
+        "step_times",
+        "Step times of a dig cycle",
+        "time in the cycle [s]",
+        "computing time [ms]; awake parcels / 100",
+        (
+            Series("computing time of a step [ms]", seconds, times, style="line"),
+            Series("awake parcels / 100", seconds, awake / 100.0, style="line"),
         ),
     )
 

@@ -11,9 +11,8 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Plot, Result, Series, Table
-from validation.soil.tracking import track
 
 Array = NDArray[np.float64]
 
@@ -70,17 +69,6 @@ def hard_ground(parameters: SoilParameters) -> SoilParameters:
     return dataclasses.replace(parameters, cohesion_pa=1e5, penetration_scale=20.0)
 
 
-def external_power_w(machine: ExcavatorMachine) -> float:
-    """Return the power of all external forces on the machine at this moment [W]."""
-    model, data = machine.model, machine.data
-    velocity, power = np.zeros(6), float(data.qfrc_applied @ data.qvel)
-    for body in np.flatnonzero(np.any(data.xfrc_applied != 0.0, axis=1)):
-        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, velocity, 0)
-        force, torque = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:]
-        power += float(force @ velocity[3:] + torque @ velocity[:3])
-    return power
-
-
 def dig(parameters: SoilParameters, *, fidelity: str) -> Dig:
     """Lower the bucket into level ground, drag, hold, drag on and lift.
 
@@ -101,7 +89,7 @@ def dig(parameters: SoilParameters, *, fidelity: str) -> Dig:
             machine.tick(np.array(command), reaction)
             edges.append(machine.cutting_edge_pos_w)
             speeds.append(float((edges[-1] - before) @ ahead) / TICK_S)
-            powers.append(external_power_w(machine))
+            powers.append(float(machine.data.qfrc_applied @ machine.data.qvel))  # of the soil alone
             forces.append(float(np.linalg.norm(reaction.force_w_n)))
             phases.append(number)
     return Dig(
@@ -137,19 +125,11 @@ def run(conditions: Conditions) -> Result:
         rows.append(
             (name, float(one.force_n.max()) / 1e3, slowest, float(free), float(one.power_w[dragged].min()))
         )
-    return Result(
-        checks=tuple(checks),
-        tables=(
-            Table(
-                header=(
-                    *("soil", "greatest force [kN]", "mean speed dragging on [m/s]", "greatest speed [m/s]"),
-                    "greatest power taken [W]",
-                ),
-                rows=tuple(rows),
-            ),
-        ),
-        plots=(_plot(digs),),
+    header = (
+        *("soil", "greatest force [kN]", "mean speed dragging on [m/s]", "greatest speed [m/s]"),
+        "greatest power taken [W]",
     )
+    return Result(checks=tuple(checks), tables=(Table(header, tuple(rows)),), plots=(_plot(digs),))
 
 
 def _checks(name: str, one: Dig) -> list[Check]:
@@ -158,28 +138,26 @@ def _checks(name: str, one: Dig) -> list[Check]:
     backwards = max(0.0, -float(one.edge_speed_m_s[one.during("drag", "drag on")].min()))
     work = float(one.power_w.sum()) * TICK_S
     return [
-        Check(
-            name=f"greatest power of the soil, {name}", value=float(one.power_w.max()), unit="W", high=POWER_W
-        ),
-        Check(name=f"work of the soil, {name}", value=work, unit="J", high=0.0),
-        Check(name=f"speed backwards while dragging, {name}", value=backwards, unit="m/s", high=REVERSAL_M_S),
-        Check(name=f"drift while held in the soil, {name}", value=drift, unit="m", high=DRIFT_M),
+        Check(f"greatest power of the soil, {name}", float(one.power_w.max()), "W", high=POWER_W),
+        Check(f"work of the soil, {name}", work, "J", high=0.0),
+        Check(f"speed backwards while dragging, {name}", backwards, "m/s", high=REVERSAL_M_S),
+        Check(f"drift while held in the soil, {name}", drift, "m", high=DRIFT_M),
     ]
 
 
 def _plot(digs: dict[str, Dig]) -> Plot:
     curves = []
     for k, (name, one) in enumerate(digs.items()):
-        seconds = tuple(float(v) for v in TICK_S * np.arange(1, len(one.force_n) + 1))
-        force, speed = tuple(map(float, one.force_n / 1e4)), tuple(map(float, one.edge_speed_m_s))
-        curves.append(Series(label=f"speed, {name} [m/s]", x=seconds, y=speed, style="line", color=k))
-        curves.append(Series(label=f"force, {name} [10 kN]", x=seconds, y=force, style="dashed", color=k))
+        seconds = TICK_S * np.arange(1, len(one.force_n) + 1)
+        force, speed = one.force_n / 1e4, one.edge_speed_m_s
+        curves.append(Series(f"speed, {name} [m/s]", seconds, speed, style="line", color=k))
+        curves.append(Series(f"force, {name} [10 kN]", seconds, force, style="dashed", color=k))
     return Plot(
-        name="stall",
-        title="Lower, drag, hold, drag on, lift",
-        x_label="time [s]",
-        y_label="speed of the edge [m/s]; force [10 kN]",
-        curves=tuple(curves),
+        "stall",
+        "Lower, drag, hold, drag on, lift",
+        "time [s]",
+        "speed of the edge [m/s]; force [10 kN]",
+        tuple(curves),
     )
 
 

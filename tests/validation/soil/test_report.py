@@ -13,20 +13,17 @@ from validation.soil.results import Check, Plot, Result, Series, Table
 DOCS = Path(__file__).parents[3] / "docs"
 
 RESULT = Result(
-    checks=(
-        Check(name="fall time", value=0.2, unit="%", high=1.0),
-        Check(name="run-out of 30°", value=0.7, low=0.9, high=1.6),
-    ),
-    tables=(Table(header=("soil", "mass [kg]"), rows=(("sand", 485.0),)),),
+    checks=(Check("fall time", 0.2, "%", high=1.0), Check("run-out of 30°", 0.7, low=0.9, high=1.6)),
+    tables=(Table(("soil", "mass [kg]"), (("sand", 485.0),)),),
     plots=(
         Plot(
-            name="falling",
-            title="Falling",
-            x_label="t [s]",
-            y_label="z [m]",
-            curves=(
-                Series(label="law", x=(1.0, 2.0), y=(1.0, 2.0), style="line"),
-                Series(label="gate", x=(1.0, 2.0), y=(0.5, 1.0), y_high=(2.0, 3.0)),
+            "falling",
+            "Falling",
+            "t [s]",
+            "z [m]",
+            (
+                Series("law", (1.0, 2.0), (1.0, 2.0), style="line"),
+                Series("gate", (1.0, 2.0), (0.5, 1.0), y_high=(2.0, 3.0)),
             ),
         ),
     ),

@@ -11,7 +11,7 @@ from validation.soil.results import Check, Result, Table, number_text
     [(0.5, True, 0.0), (1.6, True, 0.0), (0.4, False, 0.1), (1.9, False, 0.3), (math.nan, False, math.inf)],
 )
 def test_a_gate_includes_its_ends_and_tells_by_how_much_it_is_missed(value, passed, missed_by):
-    check = Check(name="prefactor", value=value, low=0.5, high=1.6)
+    check = Check("prefactor", value, low=0.5, high=1.6)
     assert check.passed is passed
     assert check.missed_by == pytest.approx(missed_by)
 
@@ -21,7 +21,7 @@ def test_a_gate_includes_its_ends_and_tells_by_how_much_it_is_missed(value, pass
     [(0.5, 1.6, "0.5 to 1.6"), (0.0, 0.0, "= 0"), (10.0, math.inf, "≥ 10"), (-math.inf, 1e-9, "≤ 1e-09")],
 )
 def test_a_gate_is_put_into_words(low, high, text):
-    assert Check(name="x", value=0.0, low=low, high=high).gate_text == text
+    assert Check("x", 0.0, low=low, high=high).gate_text == text
 
 
 @pytest.mark.parametrize(
@@ -40,8 +40,8 @@ def test_numbers_are_shown_with_three_digits(value, text):
 
 
 def test_a_result_names_what_missed_and_is_plain_data():
-    good, bad = Check(name="good", value=1.0, low=0.0), Check(name="bad", value=math.nan, high=1.0)
-    result = Result(checks=(good, bad), tables=(Table(header=("a",), rows=((1.0,),)),))
+    good, bad = Check("good", 1.0, low=0.0), Check("bad", math.nan, high=1.0)
+    result = Result(checks=(good, bad), tables=(Table(("a",), ((1.0,),)),))
     assert not result.passed
     assert result.missed == (bad,)
     written = json.loads(json.dumps(result.as_dict(), allow_nan=False))
