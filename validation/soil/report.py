@@ -54,7 +54,7 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
     missed = sum(len(result.missed) for _, result in outcomes)
     total = sum(len(result.checks) for _, result in outcomes)
     seeds = ", ".join(map(str, conditions.seeds))
-    command = "lerobot-excav bench soil --report"
+    command = "python -m validation.soil --report"
     return (
         "# Soil against published experiments\n\n"
         f"Written by `{command}`; do not edit it. {total - missed} of {total} gated values are inside "
@@ -71,7 +71,7 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
         "of the simulation, "
         f"{platform.machine()} with {os.cpu_count()} cores.\n\n"
         "How the soil works: [soil.md](soil.md). Every experiment is one file in "
-        "`lerobot_excav/evaluation/soil_validation/` and uses the soil's public surface only."
+        "`validation/soil/` and uses the soil's public surface only."
     )
 
 

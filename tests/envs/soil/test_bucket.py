@@ -45,10 +45,6 @@ def test_the_heap_over_a_level_opening_is_a_hip_roof(length, width, slope):
     assert heap == pytest.approx(roof.mean() * length * width, rel=1e-3)
 
 
-def test_a_full_bucket_of_sand_weighs_what_operators_load():
-    assert 470.0 <= heaped_volume_m3(BUCKET, SAND.slope_tan) * SAND.density_kg_m3 <= 495.0
-
-
 def test_what_enters_waits_and_what_waits_is_born():
     bucket, field = fresh()
     volume = field.volume_m3

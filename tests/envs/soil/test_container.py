@@ -30,7 +30,7 @@ def test_local_axes_turn_with_the_yaw():
         (box(3.2, 3.2, yaw=-np.pi / 4), True),
     ],
 )
-def test_overlap_with_the_dig_area(placed, overlaps):  # noqa: FBT001
+def test_overlap_with_the_dig_area(placed, overlaps):
     assert placed.overlaps((6.0, 6.0)) is overlaps
 
 

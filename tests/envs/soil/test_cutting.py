@@ -36,25 +36,14 @@ def pose(edge, turned):
 def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     window = field.window(now.place(BUCKET.corners_t))
-    return cut(
-        field.heights,
-        field.active,
-        field.grid,
-        PLANES,
-        before,
-        now,
-        window,
-        bins,
-        room,
-        intake.bins,
-    )
+    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, intake.bins)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
 
 
 @given(angles=angles, x=st.floats(-1.2, 1.2), y=st.floats(-1.2, 1.2))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_vertical_line_is_inside_exactly_where_its_points_are(angles, x, y):
     turned, z = rotation(*angles), np.arange(-2.0, 2.0, 0.001)
     low, high, top = column_interval(PLANES, np.zeros(3), turned, x, y)
@@ -72,7 +61,7 @@ points = st.tuples(st.floats(-0.2, 1.5), st.floats(-0.6, 0.6), st.floats(-0.3, 0
 
 
 @given(before=points, mix=st.lists(st.floats(0.01, 1.0), min_size=16, max_size=16))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_point_came_through_the_face_that_the_reference_finds(before, mix):
     now = np.array(mix) @ BUCKET.corners_t / sum(mix)
     expected = reference.crossed_face(PLANES, np.array(before), now)
@@ -86,7 +75,7 @@ def test_a_point_came_through_the_face_that_the_reference_finds(before, mix):
     step=st.tuples(st.floats(-0.025, 0.025), st.floats(-0.025, 0.025), st.floats(-0.025, 0.025)),
     room=st.sampled_from([0.0, 0.001, 1.0]),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(angles, edge, step, room):
     turned, field = rotation(*angles), flat(0.5)
     before, now = pose(edge, turned), pose(tuple(np.add(edge, step)), turned)

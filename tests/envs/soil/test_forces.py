@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.soil import BUCKET, tool_at
-from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import SoilResistance, bearing_factors, blade_force_n
 from lerobot_excav.envs.soil.height_field import HeightField
-from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
+from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.wedge import PENETRATION_CAP_N
 
@@ -22,26 +22,6 @@ PLATE_RAD = math.atan2(0.39, -0.39)
 
 EMPTY_COM_T = np.array([0.5, 0.0, 0.3])
 
-# N_gamma of sand by rake [deg], for friction 39 and soil-steel friction 26 degrees
-WEIGHT_FACTORS = {20: 2.31, 30: 1.97, 40: 1.93, 50: 2.08, 60: 2.44, 70: 3.16}
-
-# Cutting of dry sand (Hatamura and Chijiiwa 1977, as computed after Miedema): rake [deg] to the forces [N] at depths of
-# 5, 10, 15 cm by three theories: plane wedge | with side crescents | with the layer that rides on the blade.
-BLADE_FORCES_N = {
-    30: ((23, 24, 69), (92, 117, 92), (207, 304, 207)),
-    45: ((23, 27, 107), (92, 130, 169), (207, 337, 207)),
-    60: ((28, 36, 168), (113, 171, 279), (254, 444, 333)),
-    75: ((43, 55, 289), (172, 270, 493), (387, 716, 610)),
-    90: ((92, 119, 643), (367, 611, 1102), (827, 1673, 1378)),
-}
-BLADE_SAND = SoilParameters(
-    density_kg_m3=1460.0,
-    friction_angle_rad=math.radians(38.0),
-    cohesion_pa=0.0,
-    swell=1.0,
-    steel_friction_angle_rad=math.radians(26.6),
-)
-
 
 def flat(height=1.0):
     field = HeightField((120, 120), (0.05, 0.05), 0.0)
@@ -49,11 +29,13 @@ def flat(height=1.0):
     return field
 
 
+def answer(resistance, field, tool, floor_depth_m=0.0, payload=(0.0, EMPTY_COM_T)):
+    return resistance.react(field.heights, field.heights, field.grid, tool, floor_depth_m, TICK_S, *payload)
+
+
 def react(parameters, field, tool, floor_depth_m=0.0):
     resistance = SoilResistance(parameters, 8)
-    return resistance.react(
-        field.heights, field.heights, field.grid, tool, floor_depth_m, 0.02, 0.0, EMPTY_COM_T
-    )
+    return answer(resistance, field, tool, floor_depth_m)
 
 
 def force(parameters, field, tool, *kinds):
@@ -82,41 +64,14 @@ def test_flat_ground_gives_the_fundamental_equation_of_earthmoving(rake, depth):
     assert found[2] == pytest.approx(-expected * math.cos(math.radians(rake) + steel), rel=0.01)
 
 
-@pytest.mark.parametrize(("rake", "factor"), WEIGHT_FACTORS.items())
-def test_the_blade_reproduces_the_table_of_weight_factors(rake, factor):
-    soil = dataclasses.replace(
-        SAND, friction_angle_rad=math.radians(39.0), steel_friction_angle_rad=math.radians(26.0)
-    )
-    found = np.linalg.norm(blade_force_n(soil, 0.3, math.radians(rake), 0.7))
-    weight = soil.density_kg_m3 * GRAVITY_M_S2 * 0.3**2 * 0.7
-    assert found / weight == pytest.approx(factor, rel=0.01)
-
-
 @given(rake=st.floats(0.3, 1.4), depth=st.floats(0.02, 0.3), by=st.floats(0.2, 3.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_force_scales_with_density_width_and_square_of_depth(rake, depth, by):
     once = blade_force_n(SAND, depth, rake, 0.7)
     heavier = dataclasses.replace(SAND, density_kg_m3=SAND.density_kg_m3 * by)
     np.testing.assert_allclose(blade_force_n(heavier, depth, rake, 0.7), by * once, rtol=1e-9)
     np.testing.assert_allclose(blade_force_n(SAND, depth, rake, 0.7 * by), by * once, rtol=1e-9)
     np.testing.assert_allclose(blade_force_n(SAND, depth * by, rake, 0.7), by**2 * once, rtol=1e-9)
-
-
-@pytest.mark.parametrize("rake", BLADE_FORCES_N)
-def test_the_flat_blade_stays_within_the_theories_of_cutting_dry_sand(rake):
-    found = [
-        float(np.linalg.norm(blade_force_n(BLADE_SAND, depth, math.radians(rake), 0.33)))
-        for depth in (0.05, 0.10, 0.15)
-    ]
-    for size, theories in zip(found, BLADE_FORCES_N[rake], strict=True):
-        assert 0.8 * min(theories) <= size <= 1.25 * max(theories)
-    assert 1.6 <= math.log(found[2] / found[0]) / math.log(3.0) <= 2.1
-
-
-def test_the_flat_blade_meets_least_at_a_rake_of_35_to_45_degrees():
-    rakes = np.radians(np.arange(20.0, 76.0))
-    sizes = [np.linalg.norm(blade_force_n(BLADE_SAND, 0.1, float(rake), 0.33)) for rake in rakes]
-    assert 33.0 <= math.degrees(rakes[int(np.argmin(sizes))]) <= 47.0
 
 
 def test_cohesion_adds_its_term():
@@ -137,16 +92,6 @@ def test_the_weight_of_a_heap_ahead_counts():
     assert np.linalg.norm(force(SAND, heaped, dragged(40, 0.3), PatchKind.WEDGE)) > 1.5 * np.linalg.norm(
         force(SAND, flat(), dragged(40, 0.3), PatchKind.WEDGE)
     )
-
-
-def test_there_is_no_force_above_the_surface_and_it_starts_from_zero():
-    depths = np.linspace(-0.05, 0.4, 200)
-    edge = (PatchKind.WEDGE, PatchKind.PENETRATION)
-    forces = np.array([np.linalg.norm(force(SAND, flat(), dragged(35, d), *edge)) for d in depths])
-    assert (forces[depths <= 0] == 0).all()
-    assert forces[depths > 0].min() > 0
-    assert (np.diff(forces) >= 0).all()
-    assert np.diff(forces).max() < 0.02 * forces.max()
 
 
 def test_the_edge_bears_more_as_it_goes_deeper_over_the_ramp():
@@ -178,7 +123,7 @@ def test_the_penetration_scale_scales_and_the_cap_limits():
     velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2)),
     turning=st.floats(-2, 2),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_the_soil_never_drives_the_bucket(pitch, depth, velocity, turning):
     edge = np.array([0.0, 0.0, 1.0 - depth])
     tool = tool_at(edge, pitch, np.array(velocity), turning)
@@ -189,7 +134,7 @@ def test_the_soil_never_drives_the_bucket(pitch, depth, velocity, turning):
 
 
 @given(pitch=st.floats(-3.0, -1.4), depth=st.floats(0.05, 0.5), angle=st.floats(0.0, 2 * math.pi))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_what_the_soil_can_hold_depends_on_the_pose_and_not_on_the_motion(pitch, depth, angle):
     """Nothing can jump with the direction of motion: for the first step, before any sinkage."""
     edge = np.array([0.0, 0.0, 1.0 - depth])
@@ -250,11 +195,8 @@ def test_the_world_floor_depth_shifts_the_force_only():
 
 
 def test_the_reaction_says_what_the_bucket_holds():
-    field = flat()
     com = np.array([0.6, 0.1, 0.2])
-    found = SoilResistance(SAND, 8).react(
-        field.heights, field.heights, field.grid, dragged(40, 0.3), 0.0, 0.02, 321.0, com
-    )
+    found = answer(SoilResistance(SAND, 8), flat(), dragged(40, 0.3), payload=(321.0, com))
     assert found.payload_mass_kg == 321.0
     np.testing.assert_array_equal(found.payload_com_t, com)
 
@@ -264,8 +206,7 @@ def test_a_bucket_that_was_away_has_not_sunk_in():
     tool = tool_at(np.array([0.0, 0.0, 1.0]), -math.pi, np.array([0.0, 0.0, -1.0]), 0.0)
 
     def held():
-        args = (field.heights, field.heights, field.grid, tool, 0.0, 0.02, 0.0, EMPTY_COM_T)
-        return float(resistance.react(*args).patches.limits_n.sum())
+        return float(answer(resistance, field, tool).patches.limits_n.sum())
 
     first, second = held(), held()
     resistance.forget()
@@ -280,10 +221,7 @@ def test_a_bucket_described_anew_remembers_how_far_it_has_sunk_in():
         resistance = SoilResistance(SAND, 8)
         for _ in range(3):
             geometry = dataclasses.replace(BUCKET) if anew else BUCKET
-            now = dataclasses.replace(tool, geometry=geometry)
-            reaction = resistance.react(
-                field.heights, field.heights, field.grid, now, 0.0, 0.02, 0.0, EMPTY_COM_T
-            )
+            reaction = answer(resistance, field, dataclasses.replace(tool, geometry=geometry))
         limits.append(reaction.patches.limits_n)
     np.testing.assert_array_equal(*limits)
 

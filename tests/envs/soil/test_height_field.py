@@ -11,7 +11,7 @@ def field():
 
 
 @given(x=st.floats(-0.5, 0.5), y=st.floats(-0.2, 0.2), volume=st.floats(1e-6, 1.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_deposit_keeps_its_volume_wherever_it_falls(x, y, volume):
     soil = field()
     soil.deposit(np.array([[x, y]]), np.array([volume]))

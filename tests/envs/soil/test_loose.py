@@ -1,46 +1,34 @@
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.soil import Soil
 from lerobot_excav.errors import ConfigurationError
 
-TICK = 0.02
 TILTED = Container(
     center_w=np.array([5.0, 0.5, 0.2]), half_extent_m=np.array([1.0, 0.6]), wall_height_m=0.8, yaw_rad=0.4
 )
 
 
 def fall(soil, seconds):
-    for _ in range(round(seconds / TICK)):
-        soil.step(TICK)
+    for _ in range(round(seconds / TICK_S)):
+        soil.step(TICK_S)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-@pytest.mark.parametrize("height", [0.5, 1.0, 2.5])
-def test_a_parcel_falls_for_the_time_of_free_fall(height, fidelity):
-    soil = Soil(fidelity=fidelity)
-    soil.add_parcels([[0.3, 0.2, height + soil.parcel_radius_m]], [[0.0, 0.0, 0.0]])
-    ticks = 0
-    while soil.parcel_positions_w[0, 2] > soil.parcel_radius_m:
-        soil.step(TICK)
-        ticks += 1
-    assert ticks == math.ceil(math.sqrt(2 * height / GRAVITY_M_S2) / TICK - 0.06)
-
-
-@given(velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 3)))
-@settings(max_examples=20, deadline=None)
-def test_the_flight_is_a_parabola_and_gains_no_energy(velocity):
+@given(
+    velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 3)),
+    fidelity=st.sampled_from(sorted(FIDELITIES)),
+)
+@settings(max_examples=20)
+def test_the_flight_is_a_parabola_and_gains_no_energy(velocity, fidelity):
     """Semi-implicit Euler falls g t dt / 2 too far and loses g^2 t dt / 2 of energy per kilogram."""
-    soil = Soil()
-    start, time, substep = np.array([0.0, 0.0, 5.0]), 0.4, TICK / soil.fidelity.substeps_per_tick
+    soil = Soil(fidelity=fidelity)
+    start, time, substep = np.array([0.0, 0.0, 5.0]), 0.4, TICK_S / soil.fidelity.substeps_per_tick
     soil.add_parcels([start], [velocity])
     energy = soil.mechanical_energy_j()
     fall(soil, time)
@@ -49,19 +37,6 @@ def test_the_flight_is_a_parabola_and_gains_no_energy(velocity):
     np.testing.assert_allclose(soil.parcel_positions_w[0], expected, atol=1e-9)
     lost = energy - soil.mechanical_energy_j()
     assert lost == pytest.approx(0.5 * soil.parcel_mass_kg * GRAVITY_M_S2**2 * time * substep, rel=1e-6)
-
-
-def test_the_centre_of_mass_of_falling_parcels_does_not_drift_sideways(rng):
-    soil = Soil()
-    start = np.array([0.0, 0.0, 4.0]) + rng.uniform(-0.15, 0.15, (60, 3))
-    soil.add_parcels(start, np.zeros((60, 3)))
-    fall(soil, 0.5)
-    assert (
-        np.linalg.norm(soil.parcel_positions_w - start, axis=1).max() > 0.05
-    )  # they pushed each other apart
-    np.testing.assert_allclose(
-        soil.parcel_positions_w[:, :2].mean(axis=0), start[:, :2].mean(axis=0), atol=1e-9
-    )
 
 
 def test_each_parcel_brings_its_mass_and_lands_where_it_falls():
@@ -79,7 +54,7 @@ def test_each_parcel_brings_its_mass_and_lands_where_it_falls():
     floor=st.sampled_from([0.0, 0.3]),
     preset=st.sampled_from(["sand", "gravel", "dirt", "wet_sand"]),
 )
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_rain_of_parcels_keeps_every_gram(seed, floor, preset):
     rng = np.random.default_rng(seed)
     soil = Soil(preset, container=TILTED, floor_depth_m=floor, fidelity="fast")
@@ -91,7 +66,7 @@ def test_a_rain_of_parcels_keeps_every_gram(seed, floor, preset):
     soil.add_parcels(positions, rng.uniform(-3.0, 3.0, (150, 3)))
     total = before + 150 * soil.parcel_mass_kg
     for _ in range(100):
-        soil.step(TICK)
+        soil.step(TICK_S)
         ledger = soil.ledger_kg()
         assert sum(ledger.values()) == pytest.approx(total, abs=1e-6)
         assert min(ledger.values()) >= 0.0
@@ -127,7 +102,7 @@ def test_a_parcel_above_the_wall_flies_over_it():
     vy=st.floats(-9, 9),
     z=st.floats(0.3, 2.0),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
     soil = Soil(container=TILTED)
     soil.add_parcels([[x, y, z]], [[vx, vy, 0.0]])

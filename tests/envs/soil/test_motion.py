@@ -58,7 +58,7 @@ vectors = st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-1.2, 
 
 
 @given(first=vectors, turn=vectors, share=st.floats(0.0, 1.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_turned_rotation_is_a_rotation_by_the_share_of_the_angle(first, turn, share):
     start = turned(np.eye(3), np.array(first), 1.0)
     result = turned(start, np.array(turn), share)
@@ -70,7 +70,7 @@ def test_a_turned_rotation_is_a_rotation_by_the_share_of_the_angle(first, turn, 
 
 
 @given(first=vectors, turn=vectors)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_turn_of_a_path_leads_from_the_first_rotation_to_the_last(first, turn):
     before = Pose(position=np.zeros(3), rotation=turned(np.eye(3), np.array(first), 1.0))
     now = Pose(position=np.zeros(3), rotation=turned(before.rotation, np.array(turn), 1.0))

@@ -47,7 +47,7 @@ def test_resistance_does_not_fade_at_digging_speeds_and_ends_at_rest():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_wrench_takes_power_from_every_motion(seed):
     rng = np.random.default_rng(seed)
     patches, origin = random_patches(rng, 12), rng.normal(size=3)
@@ -57,7 +57,7 @@ def test_the_wrench_takes_power_from_every_motion(seed):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_wrench_is_continuous_in_the_direction_of_motion(seed):
     """No direction of motion is a step: turning by a thousandth changes the force by about a hundredth at most."""
     rng = np.random.default_rng(seed)

@@ -35,7 +35,7 @@ def steepest(heights, cell):
     border=st.sampled_from([0.0, 0.3, math.inf]),
     wide=st.floats(0.03, 0.08),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_sweep_is_the_reference_sweep(heights, ceiling, border, wide):
     expected, expected_over = avalanche.sweep(heights, ceiling, (CELL, wide), SLOPE, border)
     active, delta = np.ones(heights.shape, dtype=np.uint8), np.zeros_like(heights)
@@ -46,7 +46,7 @@ def test_a_sweep_is_the_reference_sweep(heights, ceiling, border, wide):
 
 
 @given(heights=small_fields)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_following_only_active_columns_misses_nothing(heights):
     active, delta = np.ones(heights.shape, dtype=np.uint8), np.zeros_like(heights)
     ceiling = np.full(heights.shape, math.inf)
@@ -58,7 +58,7 @@ def test_following_only_active_columns_misses_nothing(heights):
 
 
 @given(heights=small_fields)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_heights_stay_above_the_floor_and_volume_is_kept(heights):
     rested = relax(heights, CELL, SLOPE)
     assert (rested >= 0).all()

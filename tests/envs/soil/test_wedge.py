@@ -45,7 +45,7 @@ def limits(field, edges, weighed=None, rake_deg=40.0):
 
 
 @given(failure=st.floats(0.25, 0.6), slope=st.floats(-0.4, 0.2), depth=st.floats(0.05, 0.5))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
     assume(depth < 2.7 * (math.tan(failure) - slope))  # the failure plane surfaces within the field
     field = flat()

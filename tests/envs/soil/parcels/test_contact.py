@@ -39,7 +39,7 @@ def unit(vector):
 
 
 @given(overlap=st.floats(0.0, 0.2), speed=speeds, stiffness=st.floats(1e3, 1e5), mass=st.floats(0.1, 10.0))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_normal_force_is_that_of_the_reference(overlap, speed, stiffness, mass):
     force = normal_force(overlap, speed, stiffness, math.sqrt(stiffness * mass), RADIUS)
     expected = reference.normal_force(overlap, speed, stiffness, mass, RADIUS)
@@ -49,7 +49,7 @@ def test_the_normal_force_is_that_of_the_reference(overlap, speed, stiffness, ma
 @given(
     memory=springs, normal=vectors, overlap=st.floats(0.0, 0.05), velocity=vectors, rolling=vectors, law=laws
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_contact_is_that_of_the_reference(memory, normal, overlap, velocity, rolling, law):
     n = unit(normal)
     kept, expected = np.array([memory, memory]), np.array(memory)
@@ -64,7 +64,7 @@ def test_a_contact_is_that_of_the_reference(memory, normal, overlap, velocity, r
 
 
 @given(memory=springs, normal=vectors, gap=st.floats(0.0, RADIUS), velocity=vectors, spin=vectors, law=laws)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_contact_with_a_wall_is_that_of_the_reference(memory, normal, gap, velocity, spin, law):
     n = unit(normal)
     kept, expected = np.array([memory]), np.array(memory)
@@ -76,7 +76,7 @@ def test_a_contact_with_a_wall_is_that_of_the_reference(memory, normal, gap, vel
 
 
 @given(overlap=st.floats(0.0, 0.2), speed=speeds)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_the_normal_force_never_pulls_and_pushes_nothing_that_leaves_fast(overlap, speed):
     force = normal_force(overlap, speed, STIFFNESS, IMPEDANCE, RADIUS)
     assert force >= 0.0
@@ -92,7 +92,7 @@ def test_the_normal_force_at_rest_is_the_spring_up_to_its_largest_overlap():
 
 
 @given(normal=vectors, velocity=vectors, rolling=vectors, memory=springs, law=laws)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_sliding_and_rolling_forces_are_tangential_and_at_most_friction(
     normal, velocity, rolling, memory, law
 ):

@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,9 +8,8 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.contact import LARGEST_OVERLAP, SEPARATION_M_S, Law
 from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, advance
-from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.pairs import room_for
-from lerobot_excav.envs.soil.parcels.plates import BoxWalls, ToolPath
+from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from lerobot_excav.envs.soil.parcels.store import State
 from validation.soil.reference import motion as reference
 from validation.soil.reference.plates import bucket_polygons, nearest_point
@@ -22,9 +20,6 @@ DT = 0.001
 STIFFNESS = MASS * (0.2 / DT) ** 2
 BOX = BoxWalls(0.4, 0.1, 0.0, 0.5, 0.4, 0.5, math.cos(0.3), math.sin(0.3))
 WEIGHT = np.array([0.0, 0.0, -GRAVITY_M_S2])
-
-MakeState, MakeTool, MakeSite = Callable[..., State], Callable[..., ToolPath], Callable[..., Site]
-NoTool = Callable[[int], ToolPath]
 
 
 def run(state, tool, site, laws, steps):
@@ -41,16 +36,8 @@ def energy(state):
 
 
 @given(seed=st.integers(0, 2**16), cohesion=st.sampled_from([0.0, 2100.0]), has_tool=st.booleans())
-@settings(max_examples=25, deadline=None)
-def test_sub_steps_are_those_of_the_reference(
-    random_state,
-    tool_path,
-    site,
-    laws,
-    seed,
-    cohesion,
-    has_tool,  # noqa: FBT001
-):
+@settings(max_examples=25)
+def test_sub_steps_are_those_of_the_reference(random_state, tool_path, site, laws, seed, cohesion, has_tool):
     """A crowd in a moving bucket above a box and rough ground: all contacts at once."""
     rng, steps = np.random.default_rng(seed), 8
     laws = laws._replace(parcel=laws.parcel._replace(cohesion=cohesion))
@@ -73,7 +60,7 @@ def test_sub_steps_are_those_of_the_reference(
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mass(
     random_state, no_tool, site, laws, seed
 ):
@@ -286,7 +273,7 @@ def crosses(polygon, start, end):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, site, laws, seed):
     """Thrown at the bucket from all sides, while that moves as fast as sub-steps allow."""
     rng, steps, count = np.random.default_rng(seed), 25, 40

@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -7,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.height_field import surface_height
-from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site, ground_below, press_ground
+from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, ground_below, press_ground
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
@@ -21,7 +20,6 @@ from validation.soil.reference import ground as reference
 RADIUS = 0.045
 DT = 0.001
 BOX = BoxWalls(4.2, 0.5, 0.2, 1.0, 0.6, 1.0, math.cos(0.4), math.sin(0.4))
-MakeState, MakeSite = Callable[..., State], Callable[..., Site]
 
 
 def rough(site, rng):
@@ -29,7 +27,7 @@ def rough(site, rng):
 
 
 @given(seed=st.integers(0, 2**16), x=st.floats(-3.5, 5.5), y=st.floats(-3.5, 3.5))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_ground_below_is_that_of_the_reference(site, seed, x, y):
     ground = rough(site, np.random.default_rng(seed))
     place, height, normal = ground_below(ground, x, y)
@@ -40,7 +38,7 @@ def test_the_ground_below_is_that_of_the_reference(site, seed, x, y):
 
 
 @given(seed=st.integers(0, 2**16), x=st.floats(-2.85, 2.85), y=st.floats(-2.85, 2.85))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_height_and_normal_are_those_of_the_sampled_surface(site, seed, x, y):
     """Central differences are exact on a bilinear patch, as long as they stay on it."""
     ground = rough(site, np.random.default_rng(seed))
@@ -79,7 +77,7 @@ def test_what_lies_below(site, x, y, place):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_ground_presses_parcels_as_the_reference_does(random_state, site, laws, seed):
     rng = np.random.default_rng(seed)
     ground = rough(site, rng)

@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,7 +10,6 @@ from validation.soil.reference import pairs as reference
 
 RADIUS = 0.045
 DT = 0.001
-MakeState = Callable[..., State]
 
 
 def listed(pairs, count):
@@ -30,7 +27,7 @@ def first_list(state, room=None):
 
 
 @given(seed=st.integers(0, 2**16), count=st.integers(1, 40), size=st.sampled_from([0.1, 0.3, 1.0, 4.0]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_all_neighbours_are_listed_once_and_no_others(random_state, seed, count, size):
     rng = np.random.default_rng(seed)
     state = random_state(rng, count, size, centre=rng.uniform(-30.0, 30.0, 3))
@@ -56,7 +53,7 @@ def test_a_crowd_gets_the_room_that_it_needs(make_state):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state, laws, seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 12, 0.12)
@@ -83,7 +80,7 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state,
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_forces_between_parcels_keep_linear_and_angular_momentum(random_state, laws, seed):
     state = random_state(np.random.default_rng(seed), 12, 0.1)
     press_pairs(state, first_list(state), laws.parcel, DT)
@@ -103,7 +100,7 @@ def remembered(state, rng):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(random_state, make_state, seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 20, 0.15)
@@ -141,7 +138,7 @@ def test_memory_survives_when_more_parcels_come_than_there_was_room_for(random_s
 
 
 @given(seed=st.integers(0, 2**16), step=st.floats(0.0, 0.5), wind=st.floats(-10.0, 10.0))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(random_state, seed, step, wind):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 25, 0.25)

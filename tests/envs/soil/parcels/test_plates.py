@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +10,6 @@ from bench.soil import BUCKET
 from lerobot_excav.envs.soil.parcels.plates import (
     CLOSEST,
     BoxWalls,
-    ToolPath,
     inside_depth,
     nearest_on_plate,
     press_box,
@@ -28,7 +26,6 @@ SHELL = len(BUCKET.profile_t) - 1
 BOX = BoxWalls(4.0, 1.0, 0.2, 0.6, 0.4, 1.0, math.cos(0.3), math.sin(0.3))
 
 points = st.tuples(st.floats(-0.3, 1.5), st.floats(-0.7, 0.7), st.floats(-0.4, 0.9))
-MakeState, MakeTool = Callable[..., State], Callable[..., ToolPath]
 
 
 def copy(state):
@@ -64,7 +61,7 @@ GRAINS = grains_of_plates()
 
 
 @given(point=points, plate=st.integers(0, SHELL + 1))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_the_nearest_point_of_a_plate_is_that_of_the_reference_and_of_dense_samples(tool_path, point, plate):
     tool = tool_path()
     found = np.array(nearest_on_plate(tool.profile, tool.planes, tool.half_width, plate, point))
@@ -76,7 +73,7 @@ def test_the_nearest_point_of_a_plate_is_that_of_the_reference_and_of_dense_samp
 
 
 @given(point=points)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_depth_inside_is_the_distance_to_the_nearest_plane(point):
     rest = BUCKET.planes_t[:, 3] - BUCKET.planes_t[:, :3] @ point
     assert inside_depth(BUCKET.planes_t, 0, point) == pytest.approx(rest.min())
@@ -84,7 +81,7 @@ def test_depth_inside_is_the_distance_to_the_nearest_plane(point):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_bucket_presses_parcels_as_its_polygons_do(random_state, tool_path, laws, seed):
     rng = np.random.default_rng(seed)
     tool = tool_path(
@@ -105,7 +102,7 @@ def test_the_bucket_presses_parcels_as_its_polygons_do(random_state, tool_path, 
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_walls_of_the_box_press_parcels_as_their_polygons_do(random_state, laws, seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 25, [0.9, 0.7, 0.7], centre=(4.0, 1.0, 0.7))
@@ -145,7 +142,7 @@ def test_where_a_parcel_is_at_the_bucket(make_state, tool_path, laws, point_t, p
 
 
 @given(point=points)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(make_state, tool_path, laws, point):
     tool = tool_path()
     plates = reference.bucket_polygons(tool)

@@ -1,6 +1,5 @@
 import math
 import pickle
-from collections.abc import Callable
 from copy import deepcopy
 
 import numpy as np
@@ -9,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.soil import BUCKET
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels import population as module
 from lerobot_excav.envs.soil.parcels.ground import Site
-from lerobot_excav.envs.soil.parcels.plates import NO_BOX, ToolPath
-from lerobot_excav.envs.soil.parcels.population import SETTLING_SPEED_M_S, SETTLING_TIME_S, Population
+from lerobot_excav.envs.soil.parcels.plates import NO_BOX
+from lerobot_excav.envs.soil.parcels.population import SETTLING_SPEED_M_S, SETTLING_TIME_S
 from lerobot_excav.envs.soil.parcels.store import (
     OUTSIDE_OF_SHELL,
     TOUCHES_BOX_FLOOR,
@@ -26,15 +26,11 @@ from validation.soil.reference import motion as reference
 
 RADIUS = 0.045
 MASS = 0.94
-TICK = 0.02
 STEPS = 20
 
 NO_GROUND = Site(
     np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0
 )
-
-MakePopulation = Callable[..., Population]
-MakeTool, MakeSite, NoTool = Callable[..., ToolPath], Callable[..., Site], Callable[[int], ToolPath]
 
 
 def add(population, positions, velocities=None, masses=None):
@@ -54,7 +50,7 @@ def test_the_radius_of_a_parcel_is_that_of_its_mass(make_population):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(
     laws, make_population, seed
 ):
@@ -87,8 +83,8 @@ def fallen(population, tool, site, ticks, rng):
     for tick in range(ticks):
         if tick % 2 == 0:
             add(population, np.array([0.0, 0.0, 0.4]) + rng.uniform(-0.15, 0.15, (4, 3)))
-        population.step(tool, site, TICK, cutting=False)
-        landed.append(population.settle(NO_GROUND, TICK))
+        population.step(tool, site, TICK_S, cutting=False)
+        landed.append(population.settle(NO_GROUND, TICK_S))
     return landed
 
 
@@ -144,13 +140,13 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_popu
             add(population, start, rng.normal(0.0, 0.05, (8, 3)))
             joined += tick > 0
         twin = copy(population.state)
-        population.step(no_tool(STEPS), site(), TICK, cutting=False)
-        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK / STEPS, STEPS)
+        population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
+        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS)
         np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
         touching = population.state.ground == TOUCHES_OUTSIDE
         gone = touching & (population.state.load == 0)
-        left += len(population.settle(NO_GROUND, TICK).masses_kg)
+        left += len(population.settle(NO_GROUND, TICK_S).masses_kg)
         memory = without(memory, gone)
     assert left >= 8
     assert joined == 2
@@ -167,7 +163,7 @@ def lying(population, **arrays):
 
 def ticks_until_landed(population):
     for tick in range(1, 20):
-        if len(population.settle(NO_GROUND, TICK).masses_kg):
+        if len(population.settle(NO_GROUND, TICK_S).masses_kg):
             return tick
     return None
 
@@ -176,7 +172,7 @@ def ticks_until_landed(population):
 def test_a_parcel_becomes_ground_when_it_has_been_slow_there_for_a_while(make_population, place):
     population = make_population()
     lying(population, ground=place, velocities=[0.9 * SETTLING_SPEED_M_S, 0.0, 0.0])
-    assert ticks_until_landed(population) == math.ceil(SETTLING_TIME_S / TICK - 1e-9)
+    assert ticks_until_landed(population) == math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
     assert len(population.state.masses) == 0
 
 
@@ -201,9 +197,9 @@ def test_the_rest_must_not_be_interrupted(make_population):
     state = lying(population, ground=TOUCHES_GROUND)
     for _ in range(3):
         for _ in range(4):
-            assert len(population.settle(NO_GROUND, TICK).masses_kg) == 0
+            assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
         state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
-        population.settle(NO_GROUND, TICK)
+        population.settle(NO_GROUND, TICK_S)
         state.velocities[0, 0] = 0.0
 
 
@@ -227,7 +223,7 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
         TOUCHES_NOTHING,
     ]
     population.state.calm_s[:] = SETTLING_TIME_S
-    landed = population.settle(NO_GROUND, TICK)
+    landed = population.settle(NO_GROUND, TICK_S)
     np.testing.assert_array_equal(landed.points_w, [[0.0, 1.0], [6.0, 7.0], [9.0, 10.0]])
     np.testing.assert_allclose(landed.masses_kg, MASS * np.array([1.0, 3.0, 4.0]))
     np.testing.assert_array_equal(landed.is_on_ground, [False, False, True])
@@ -247,8 +243,8 @@ def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothin
     for _ in range(20):
         tool = tool_path((0.0, 0.0, top), math.pi, (0.0, 0.0, -0.008), steps=STEPS)
         top -= 0.008
-        population.step(tool, site(), TICK, cutting=False)
-        left += len(population.settle(NO_GROUND, TICK).masses_kg)
+        population.step(tool, site(), TICK_S, cutting=False)
+        left += len(population.settle(NO_GROUND, TICK_S).masses_kg)
     assert top < depth + RADIUS
     assert left == 1
     assert population.state.masses.sum() == 0.0
@@ -283,7 +279,7 @@ def test_a_copy_goes_on_like_its_original(copied, make_population, no_tool, site
     fallen(original, no_tool(STEPS), site(), 12, np.random.default_rng(0))
     other = copied(original)
     for population in (original, other):
-        population.step(no_tool(STEPS), site(), TICK, cutting=False)
+        population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
         landed = fallen(population, no_tool(STEPS), site(), 12, np.random.default_rng(1))
         assert any(len(one.masses_kg) for one in landed)
     assert len(original.state.masses) > 0

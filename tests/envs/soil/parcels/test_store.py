@@ -17,7 +17,7 @@ def filled(rng, count):
 
 
 @given(kept=st.lists(st.booleans(), min_size=1, max_size=30), seed=st.integers(0, 99))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_kept_rows_move_to_the_front_in_their_order_with_all_they_have(kept, seed):
     state = filled(np.random.default_rng(seed), len(kept))
     before = State(*(array.copy() for array in state))
