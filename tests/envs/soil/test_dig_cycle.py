@@ -65,13 +65,6 @@ def test_soil_falls_before_it_is_in_the_box(cycle):
     assert np.argmax(falling) < np.argmax(gained > 0.5 * gained[-1])
 
 
-def test_the_pile_lost_what_the_box_gained(cycle):
-    first, last = cycle[2][0], cycle[2][-1]
-    assert first["grid"] - last["grid"] == pytest.approx(
-        last["box"] + last["bucket"] + last["out_of_bounds"], abs=1e-6
-    )
-
-
 def test_digging_meets_resistance_and_carrying_none(cycle):
     forces = np.array([np.linalg.norm(reaction.force_w_n) for reaction in cycle[1]])
     assert 2e3 < forces[100:200].mean() < 40e3

@@ -42,18 +42,6 @@ def test_a_path_visits_the_same_poses_as_the_steps_between(steps):
     np.testing.assert_allclose(rotations, [pose.rotation for pose in visited], atol=1e-12)
 
 
-def test_the_turn_of_a_path_is_axis_times_angle_in_the_world():
-    _, _, turn = path(START, END, 3)
-    np.testing.assert_allclose(turn, [0.0, 0.6, 0.0], atol=1e-12)  # pitch down is a turn about +y
-
-
-def test_a_body_that_stands_still_has_no_turn():
-    positions, rotations, turn = path(START, START, 2)
-    np.testing.assert_allclose(turn, 0.0, atol=1e-15)
-    np.testing.assert_allclose(positions, np.tile(START.position, (3, 1)))
-    np.testing.assert_allclose(rotations, np.tile(START.rotation, (3, 1, 1)), atol=1e-15)
-
-
 vectors = st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
 
 

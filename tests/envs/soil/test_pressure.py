@@ -163,13 +163,6 @@ def test_the_sinkage_is_forgotten_when_the_plate_leaves_the_ground():
     assert sizes[4] == sizes[0]
 
 
-def test_a_plate_that_is_drawn_back_gets_weaker_soil():
-    field, plates = flat(), pressure()
-    before = [plates.patches(field.heights, field.grid, heel_down(0.9, (0, 0, -1.0)), 0.0, TICK_S)][-1]
-    after = plates.patches(field.heights, field.grid, heel_down(0.9, (0, 0, 0.5)), 0.0, TICK_S)
-    assert after.limits_n.sum() < before.limits_n.sum()
-
-
 def test_the_ground_pushes_out_of_itself_and_into_the_bucket():
     for patches in press_in(flat(), np.array([0.05, 0.1])):
         assert (patches.normals_w[:, 2] > -1e-9).all()
@@ -184,12 +177,3 @@ def test_soil_on_one_side_pushes_to_the_other():
     assert len(patches) > 0
     np.testing.assert_allclose(patches.normals_w, np.tile([0.0, -1.0, 0.0], (len(patches), 1)), atol=1e-9)
     assert patches.wrench(tool.position_w, tool.linear_velocity_w, np.zeros(3))[0][1] < -500.0
-
-
-def test_the_depth_of_the_floor_shifts_the_ground_only():
-    field = flat()
-    tool, lower = heel_down(0.8, (0, 0, -1.0)), heel_down(0.1, (0, 0, -1.0))
-    same = pressure().patches(field.heights, field.grid, tool, 0.0, TICK_S)
-    deep = pressure().patches(field.heights, field.grid, lower, 0.7, TICK_S)
-    np.testing.assert_allclose(deep.limits_n, same.limits_n, rtol=1e-9)
-    np.testing.assert_allclose(deep.points_w[:, 2] + 0.7, same.points_w[:, 2])

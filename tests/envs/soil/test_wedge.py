@@ -9,14 +9,7 @@ from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.forces import soil_strength
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
-from lerobot_excav.envs.soil.wedge import (
-    EDGE_THICKNESS_M,
-    PENETRATION_CAP_N,
-    edge_bearing,
-    edge_limits,
-    table_row,
-    wedge_area,
-)
+from lerobot_excav.envs.soil.wedge import EDGE_THICKNESS_M, edge_bearing, edge_limits, table_row, wedge_area
 from validation.soil.reference import wedge as reference
 
 SAND = soil_strength(PRESETS["sand"])
@@ -102,14 +95,6 @@ def test_the_bearing_starts_from_zero_and_grows():
     assert found[0] == 0.0
     assert (np.diff(found) > 0).all()
     assert np.diff(found).max() < 0.02 * found[-1]
-
-
-def test_the_bearing_of_the_whole_edge_is_capped():
-    strong = SAND._replace(penetration_scale=99.0)
-    edges = np.array([[0.0, y, 0.5] for y in (-0.3, -0.1, 0.1, 0.3)])
-    field = flat()
-    bearings = edge_limits(field.heights, field.heights, field.grid, edges, 0.7, AHEAD, 0.7, strong, TABLE)[1]
-    assert bearings.sum() == pytest.approx(PENETRATION_CAP_N)
 
 
 def test_cohesion_adds_its_term_to_the_bearing():

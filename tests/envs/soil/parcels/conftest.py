@@ -9,8 +9,9 @@ from bench.soil import BUCKET, rotation_at
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.motion import Pose, path
 from lerobot_excav.envs.soil.parcels.contact import Law
-from lerobot_excav.envs.soil.parcels.dynamics import Laws
+from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
 from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.pairs import room_for
 from lerobot_excav.envs.soil.parcels.plates import NO_BOX, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Population
 from lerobot_excav.envs.soil.parcels.store import WALLS, empty_state
@@ -119,3 +120,16 @@ def make_population(laws):
         return Population(PLATES, laws, RADIUS, MASS, most_awake)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def run(no_tool, site, laws):
+    """Return what advances a state by some sub-steps in one call and tells the fastest hit on a sleeping parcel."""
+
+    def run(state, steps, ground=None, tool=None, laws=laws):
+        count = len(state.masses)
+        new = np.full(count, -1, dtype=np.int64)
+        world = (tool or no_tool(steps), ground or site(), laws)
+        return advance(state, room_for(count), room_for(count), new, *world, DT, steps)[2]
+
+    return run

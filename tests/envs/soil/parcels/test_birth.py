@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET
 from lerobot_excav.envs.soil.parcels.birth import Intake, gather
-from lerobot_excav.envs.soil.tool import ToolGeometry
 
 RADIUS = 0.045
 PARCEL_M3 = 6.4e-4
@@ -92,12 +91,3 @@ def test_births_repeat_with_the_generator():
 
     np.testing.assert_array_equal(born(3), born(3))
     assert not np.array_equal(born(3), born(4))
-
-
-def test_an_intake_belongs_to_every_bucket_of_the_same_shape():
-    intake = Intake(BUCKET, RADIUS)
-    alike = ToolGeometry(profile_t=BUCKET.profile_t, inner_width_m=BUCKET.inner_width_m)
-    assert intake.belongs_to(BUCKET)
-    assert intake.belongs_to(alike)
-    assert not intake.belongs_to(ToolGeometry(profile_t=BUCKET.profile_t, inner_width_m=0.5))
-    assert not intake.belongs_to(ToolGeometry(profile_t=0.9 * BUCKET.profile_t, inner_width_m=0.72))

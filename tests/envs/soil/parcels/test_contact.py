@@ -122,16 +122,6 @@ def test_a_sticking_contact_pulls_back_to_where_it_began_and_a_sliding_one_does_
         assert force[0] == pytest.approx(-min(share, 1.0) * limit)
 
 
-def test_the_memory_turns_with_the_normal():
-    memory = np.array([[0.001, 0.0, 0.0, 0.0, 0.001, 0.0]])
-    turned = (math.sin(0.3), 0.0, math.cos(0.3))
-    still = (0.0, 0.0, 0.0)
-    contact(memory, 0, turned, 0.01, still, still, MASS, RADIUS, LAW, DT)
-    assert np.abs(memory.reshape(2, 3) @ turned).max() < 1e-15
-    assert memory[0, 0] == pytest.approx(0.001 * math.cos(0.3) ** 2)
-    assert memory[0, 4] == pytest.approx(0.001)
-
-
 def test_cohesion_is_a_pull_over_the_cross_section_and_adds_no_friction():
     sticky = LAW._replace(cohesion=2100.0)
     memory, still = np.zeros((2, 6)), (0.0, 0.0, 0.0)

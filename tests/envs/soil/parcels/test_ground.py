@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.height_field import surface_height
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, ground_below, press_ground
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from lerobot_excav.envs.soil.parcels.store import (
@@ -35,25 +34,6 @@ def test_the_ground_below_is_that_of_the_reference(site, seed, x, y):
     assert place == expected[0]
     assert height == pytest.approx(expected[1], abs=1e-12)
     np.testing.assert_allclose(normal, expected[2], atol=1e-12)
-
-
-@given(seed=st.integers(0, 2**16), x=st.floats(-2.85, 2.85), y=st.floats(-2.85, 2.85))
-@settings(max_examples=100)
-def test_height_and_normal_are_those_of_the_sampled_surface(site, seed, x, y):
-    """Central differences are exact on a bilinear patch, as long as they stay on it."""
-    ground = rough(site, np.random.default_rng(seed))
-    x0, y0, dx, dy = ground.grid
-    for value, start, size in ((x, x0, dx), (y, y0, dy)):
-        part = (value - start) / size % 1.0
-        if min(part, 1.0 - part) < 1e-3:
-            return
-    step = 1e-5
-    _, height, normal = ground_below(ground, x, y)
-    assert height == pytest.approx(surface_height(ground.heights, ground.grid, x, y), abs=1e-12)
-    for axis, (a, b) in enumerate([(step, 0.0), (0.0, step)]):
-        higher = surface_height(ground.heights, ground.grid, x + a, y + b)
-        lower = surface_height(ground.heights, ground.grid, x - a, y - b)
-        assert -normal[axis] / normal[2] == pytest.approx((higher - lower) / (2 * step), abs=1e-6)
 
 
 def test_the_slope_in_a_turned_box_is_seen_in_the_world(site):
@@ -97,18 +77,6 @@ def test_the_ground_presses_parcels_as_the_reference_does(random_state, site, la
             np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(state.ground, twin.ground)
         np.testing.assert_array_equal(state.on_ground, twin.on_ground)
-
-
-def test_a_parcel_that_leaves_the_ground_remembers_nothing(make_state, site, laws):
-    state = make_state([[0.0, 0.0, 0.04]], velocities=[[1.0, 0.0, 0.0]])
-    press_ground(state, site(), 0.0, laws.ground, DT)
-    assert state.on_ground[0] == 1
-    assert state.ground[0] == TOUCHES_GROUND
-    assert state.ground_springs.any()
-    state.positions[0, 2] = 0.1
-    press_ground(state, site(), 0.0, laws.ground, DT)
-    assert state.on_ground[0] == 0
-    assert not state.ground_springs.any()
 
 
 def test_rising_ground_lifts_a_parcel_without_speed(make_state, site, laws):

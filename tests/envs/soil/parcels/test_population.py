@@ -103,20 +103,6 @@ def test_growing_beyond_the_first_room_changes_nothing(monkeypatch, make_populat
     assert runs[0] == runs[1] == runs[2]
 
 
-def test_room_for_a_crowd_that_the_first_arrays_cannot_hold(make_population, no_tool, site):
-    """1200 parcels where there was room for 1024, 200 of them at one point with 19,900 pairs."""
-    population = make_population(most_awake=2000)
-    rng = np.random.default_rng(0)
-    add(population, np.array([0.0, 0.0, 3.0]) + rng.uniform(-1.0, 1.0, (1000, 3)))
-    population.step(no_tool(2), site(), 0.002, cutting=False)
-    add(population, np.tile([0.0, 0.0, 6.0], (200, 1)) + rng.uniform(-1e-3, 1e-3, (200, 3)))
-    population.step(no_tool(2), site(), 0.002, cutting=False)
-    state = population.state
-    assert len(state.masses) == 1200
-    assert np.isfinite(state.positions).all()
-    assert np.linalg.norm(state.velocities[1000:], axis=1).max() > 1.0  # each has seen the others
-
-
 def without(memory, gone):
     """Return the memory of pairs with the rows that stay after some have left."""
     rows = np.cumsum(~gone) - 1

@@ -38,9 +38,3 @@ def test_rows_are_views_and_copies_are_not(rng):
     assert view.masses[0] != -1.0
     view.masses[0] = -2.0
     assert target.masses[0] == -2.0
-
-
-def test_an_empty_state_is_zero_with_a_memory_for_each_plate():
-    state = empty_state(4, 7)
-    assert state.plate_springs.shape == (4, 7, 6)
-    assert all(len(array) == 4 and not array.any() for array in state)
