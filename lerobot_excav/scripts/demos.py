@@ -45,13 +45,6 @@ class ResumableArguments(WorkArguments):
     resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
 
 
-@dataclass(kw_only=True)
-class ResumableArguments(WorkArguments):
-    """Work that can be continued."""
-
-    resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
-
-
 def default_environment(**settings: Any) -> Any:
     """Return the first environment, with some settings that differ from its own defaults."""
     return EnvironmentChoice.get_choice_class(EnvironmentChoice.default_choice_name())(**settings)
