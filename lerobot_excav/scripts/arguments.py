@@ -9,6 +9,7 @@ from typing import Any, ClassVar, override
 
 import draccus
 from draccus.argparsing import ArgumentParser
+from draccus.cfgparsing import parse_string
 from draccus.help_formatter import SimpleHelpFormatter
 from draccus.wrappers.docstring import HelpOrder
 
@@ -32,10 +33,10 @@ class Arguments:
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
         if hasattr(super(), "__post_init__"):
-            super().__post_init__()
+            super().__post_init__()  # type: ignore[misc]  # of what is mixed in
 
 
-class EnvironmentChoice(draccus.ChoiceRegistry):
+class EnvironmentChoice(draccus.ChoiceRegistry):  # type: ignore[misc]  # untyped
     """The settings of an environment, chosen by `--env.type` among those of the registry."""
 
     @classmethod
@@ -47,7 +48,7 @@ class EnvironmentChoice(draccus.ChoiceRegistry):
                 choice = type(f"--env.type={name}", (spec.settings, cls), {"PREFIX": "--env."})
                 choice.__doc__ = spec.settings.__doc__
                 cls._choice_registry[name] = dataclass(kw_only=True)(choice)
-        return cls._choice_registry
+        return dict(cls._choice_registry)
 
     @classmethod
     @override
@@ -90,13 +91,29 @@ def parse_arguments[Parsed: Arguments](
         preferred_help=HelpOrder.below,
         exit_on_error=False,
     )
+    help_hint = f"`lerobot-excav {command} --help` lists the options"
+    for word in options:
+        _require_readable(word, help_hint)
     try:
-        parsed = parser.parse_args(options)
+        parsed: Parsed = parser.parse_args(options)
     except (draccus.utils.DraccusException, argparse.ArgumentError) as error:
-        raise ConfigurationError(f"{error}; `lerobot-excav {command} --help` lists the options") from None
+        # A setting of the environment that is not possible says so itself.
+        if isinstance(error.__cause__, ConfigurationError):
+            raise error.__cause__ from None
+        raise ConfigurationError(f"{' '.join(str(error).split())}; {help_hint}") from None
     if first:
         _set_first(parsed, first, command)
     return parsed
+
+
+def _require_readable(word: str, hint: str) -> None:
+    """Raise unless the value of an option is YAML, which draccus takes it for."""
+    name, _, text = word.partition("=") if word.startswith("-") else ("", "", word)
+    try:
+        parse_string(text)
+    except Exception as error:  # whatever YAML takes offence at
+        problem = " ".join(str(error).split())
+        raise ConfigurationError(f"{name}={text!r} cannot be read ({problem}); {hint}") from None
 
 
 def _set_first(parsed: Arguments, words: list[str], command: str) -> None:
@@ -113,7 +130,7 @@ def _set_first(parsed: Arguments, words: list[str], command: str) -> None:
         raise ConfigurationError(f"one {name} is needed, not {len(words)}: {' '.join(words)}")
 
 
-class _HelpFormatter(SimpleHelpFormatter):
+class _HelpFormatter(SimpleHelpFormatter):  # type: ignore[misc]  # untyped
     """LeRobot's formatter, without a default where there is none."""
 
     @override

@@ -11,11 +11,10 @@ Examples:
       other soil, finer
 """
 
-import dataclasses
 import json
 import os
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
@@ -31,9 +30,7 @@ MEASURES = ("environment", "writing", "demos")
 class BenchArguments(WorkArguments, PlayedScenes):
     """Arguments of `lerobot-excav bench`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=default_environment
-    )
+    env: EnvironmentChoice = field(default_factory=default_environment)
     """Environment, with its settings; the excavator by default."""
 
     scenes: int = with_default(PlayedScenes, "scenes", 3)

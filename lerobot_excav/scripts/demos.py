@@ -15,12 +15,12 @@ Examples:
       go on after an interruption
 """
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
+from lerobot_excav.datasets.record.workers import MOST_WORKERS
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.setting import declared_settings, setting
 from lerobot_excav.errors import require
@@ -35,6 +35,7 @@ class WorkArguments(Arguments):
         "Processes that simulate; the result does not depend on it, and 0 works in this process",
         default=2,
         low=0,
+        high=MOST_WORKERS,
     )
 
 
@@ -54,9 +55,7 @@ def default_environment(**settings: Any) -> Any:
 class DemosArguments(ResumableArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=default_environment
-    )
+    env: EnvironmentChoice = field(default_factory=default_environment)
     """Environment, with its settings; the excavator by default."""
     out: Path | None = setting("Folder of the dataset; must not exist", default=None)
 

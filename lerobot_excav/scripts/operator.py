@@ -6,16 +6,15 @@
 Examples:
   lerobot-excav operator --env.type=excavator --scenes=100 --metrics=outputs/operator.jsonl
       100 test scenes with 4 targets each
-  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
+  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/op.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
   lerobot-excav operator --env.type=fr5_grasp --env.retarget_frame=100 --scenes=100 --metrics=outputs/fr5_operator.jsonl
       the arm's operator, whose command changes after 2 s
 """
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.envs.tasks.setting import setting
@@ -26,13 +25,15 @@ from lerobot_excav.scripts.demos import ResumableArguments, default_environment,
 MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay")
 
 
+def _test_scenes() -> Any:
+    return default_environment(scene_set="test")
+
+
 @dataclass(kw_only=True)
 class OperatorArguments(ResumableArguments, PlayedScenes):
     """Arguments of `lerobot-excav operator`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=lambda: default_environment(scene_set="test")
-    )
+    env: EnvironmentChoice = field(default_factory=_test_scenes)
     """Environment, with its settings; the excavator's test scenes by default."""
 
     metrics: Path | None = setting("Metrics file to write; must not exist", default=None)

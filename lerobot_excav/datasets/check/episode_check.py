@@ -8,6 +8,8 @@ from lerobot_excav.datasets.format.episode_table import EpisodeTable
 from lerobot_excav.datasets.format.schema import MASK_KEY, STATE_KEY, TASK_STATE_KEY, camera_key
 
 MAIN_KEY = camera_key("main")
+OVERLAY = "as overlay"
+"""How `excav.mask_source` says that the mask is tinted into the main view."""
 
 FIRST_IMAGE_TOLERANCE = 2
 """Grey levels by which the first pictures of a scene may differ; graphics cards round differently (guess)."""
@@ -63,7 +65,7 @@ def _mask_problems(episode: EpisodeTable) -> Iterator[str]:
         if not np.isin(mask_img, (0, 255)).all():
             values = np.unique(mask_img)[:4].tolist()
             yield f"the target mask is not binary at frame {start}: it holds {values}; allowed are 0 and 255"
-        elif not mask_img.any() and "zero" not in episode.mask_words:
+        elif not mask_img.any() and "zero" not in episode.mask_changes:
             yield f"the target mask is empty from frame {start} on"
 
 
@@ -75,23 +77,29 @@ def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:
 
     Returns:
         Problems by episode index: another initial state or view than the scene's first episode, or the mask of
-        another target.
+        another target. Views with an overlay differ from target to target, and corrupted masks show other targets
+        or none, so these are not compared.
     """
     problems = {}
-    reference = episodes[0]
+    untinted = [episode for episode in episodes if OVERLAY not in episode.mask_changes]
     masks: dict[bytes, int] = {}
     for episode in episodes:
-        difference = episode.image(MAIN_KEY, 0).astype(int) - reference.image(MAIN_KEY, 0).astype(int)
         target = episode.pair.target_id
-        shown = masks.setdefault(episode.image(MASK_KEY, 0).tobytes(), target)
-        if not np.array_equal(episode.state[0], reference.state[0]):
+        if not np.array_equal(episode.state[0], episodes[0].state[0]):
             problems[episode.index] = (
-                f"starts in another state than episode {reference.index} of the same scene"
+                f"starts in another state than episode {episodes[0].index} of the same scene"
             )
-        elif np.abs(difference).max() > FIRST_IMAGE_TOLERANCE:
+        elif OVERLAY not in episode.mask_changes and _views_differ(episode, untinted[0]):
             problems[episode.index] = (
-                f"starts with another view than episode {reference.index} of the same scene"
+                f"starts with another view than episode {untinted[0].index} of the same scene"
             )
-        elif shown != target:
-            problems[episode.index] = f"target {target} has the mask of target {shown}"
+        elif not episode.mask_changes - {OVERLAY}:
+            shown = masks.setdefault(episode.image(MASK_KEY, 0).tobytes(), target)
+            if shown != target:
+                problems[episode.index] = f"target {target} has the mask of target {shown}"
     return problems
+
+
+def _views_differ(one: EpisodeTable, other: EpisodeTable) -> bool:
+    difference = one.image(MAIN_KEY, 0).astype(int) - other.image(MAIN_KEY, 0).astype(int)
+    return bool(np.abs(difference).max() > FIRST_IMAGE_TOLERANCE)

@@ -74,7 +74,7 @@ def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_resta
         places = "; ".join(f"episode {index} at frame {list(frames)}" for index, frames in restarts.items())
         raise DatasetError(
             f"the scene was restarted within {places}, which is no single demonstration; leave such episodes out "
-            "with --skip-restarted, if others remain, or record again (lerobot-record re-records an episode with the "
+            "with --skip_restarted, if others remain, or record again (lerobot-record re-records an episode with the "
             "left arrow key, or r)"
         )
     return whole
@@ -117,4 +117,4 @@ def _same_mask(recorded_img: NDArray[Any], drawn_img: NDArray[Any]) -> bool:
     if recorded_img.shape != drawn_img.shape:
         return False
     recorded, drawn = recorded_img[..., 0] > 127, drawn_img[..., 0] > 127
-    return bool((recorded & drawn).sum() >= MASK_OVERLAP * max((recorded | drawn).sum(), 1))
+    return bool((recorded & drawn).sum() >= MASK_OVERLAP * (recorded | drawn).sum())

@@ -95,6 +95,11 @@ class EpisodeTable:
         return str(self._constant(MASK_SOURCE_KEY))
 
     @property
+    def mask_changes(self) -> frozenset[str]:
+        """What was done to the mask of its source, in words: none if it is shown as the source made it."""
+        return frozenset(self.mask_words.split(", ")[1:])
+
+    @property
     def target_id(self) -> NDArray[Any]:
         """Target that is commanded, (n,)."""
         return self.array(TARGET_KEY)

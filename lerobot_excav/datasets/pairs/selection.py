@@ -68,7 +68,7 @@ def select(
     )
     if index.empty:
         raise DatasetError(
-            "the index has no usable episode; successes are required unless --include-failures"
+            "the index has no usable episode; successes are required unless --include_failures"
         )
     shuffled = _shuffle_scenes(index, np.random.default_rng(seed))
     if composition == "paired":
@@ -104,7 +104,7 @@ def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.
     if ranks.empty:
         raise DatasetError(
             f"no scene has a usable episode for each of the {targets} targets, so there is nothing paired to choose; "
-            "record more, add --include-failures, or choose --select=balanced"
+            "record more, add --include_failures, or choose --select=balanced"
         )
     return rows[rows["scene_rank"].isin(_first(ranks, scenes, "complete scenes"))]
 

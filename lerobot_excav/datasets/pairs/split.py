@@ -57,7 +57,7 @@ def split(rows: pd.DataFrame, unit: SplitUnit, *, eval_fraction: float = 0.2, se
     """
     require_choice("split", unit, SPLIT_UNITS)
     require(
-        0.0 <= eval_fraction < 1.0, f"--eval-fraction={eval_fraction} is out of range; allowed: 0 <= f < 1"
+        0.0 <= eval_fraction < 1.0, f"--eval_fraction={eval_fraction} is out of range; allowed: 0 <= f < 1"
     )
     ordered = rows.sort_values("episode_index")
     unit_number = ordered.groupby(SCENE_COLUMNS).ngroup() if unit == "scene" else pd.RangeIndex(len(ordered))

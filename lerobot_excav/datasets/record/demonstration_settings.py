@@ -14,6 +14,8 @@ from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, Tas
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
+MOST_SCENES, MOST_FRAMES = 100_000, 100_000  # more is a slip of the keyboard: it would fill the memory
+
 
 @dataclass(kw_only=True)
 class PlayedScenes:
@@ -30,7 +32,7 @@ class PlayedScenes:
 
     env: TaskSettings
     first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
-    scenes: int = setting("How many scenes", default=50, low=1, high=LAST_SCENE)
+    scenes: int = setting("How many scenes", default=50, low=1, high=MOST_SCENES)
     targets: int = setting(
         "Targets shown per scene: 4 pair every scene with every target, 1 shows each scene once",
         default=TARGETS_PER_SCENE,
@@ -56,6 +58,15 @@ class PlayedScenes:
             self.target_rule != "nearest" or spec.nearest_target_entry is not None,
             f"{option} has no meaning for --env.type={spec.env_type}, which tells no target as the nearest; "
             "allowed: round, uniform",
+        )
+        require(
+            self.first_scene + self.scenes - 1 <= LAST_SCENE,
+            f"--scenes={self.scenes} from --first_scene={self.first_scene} on is not possible; "
+            f"the last scene is {LAST_SCENE}",
+        )
+        require(
+            self.episode_length <= MOST_FRAMES,
+            f"--env.episode_length={self.episode_length} is too long to be kept; give a number up to {MOST_FRAMES}",
         )
         for name in spec.settings.columns():
             value = getattr(self.env, name)
@@ -127,6 +138,8 @@ class DemonstrationSettings(PlayedScenes):
             ConfigurationError: There is no such environment, or a field is not possible in it.
         """
         require_choice("--env.type", env_type, tuple(env_types()))
+        for name in settings:
+            require_choice("option", f"--{name}", tuple(f"--{known}" for known in declared_settings(cls)))
         return cls(env=env_types()[env_type].settings.of(env or {}, place="--env."), **settings)
 
     def as_record(self) -> dict[str, Any]:

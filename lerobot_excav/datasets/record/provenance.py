@@ -1,7 +1,7 @@
 """How a dataset was made: `meta/excav_demonstrations.json`.
 
-A sidecar that LeRobot's dataset tools drop, as they do with every file they do not know. Nothing depends on it except
-convenience: replays find their soil in it, and failed episodes are listed nowhere else.
+A sidecar that LeRobot's dataset tools drop, as they do with every file they do not know. Only continuing a finished run
+needs it, and failed episodes are listed nowhere else.
 """
 
 import json

@@ -12,21 +12,22 @@ from typing import Any
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.progress import EpisodeProgress
-from lerobot_excav.errors import ExcavError, require
+from lerobot_excav.errors import ExcavError, require_integer
 
 # Every worker is one simulation; libraries that start threads of their own would only fight over the cores.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS"), "1")
+
+
+MOST_WORKERS = 1024
 
 
 def require_workers(workers: int) -> None:
     """Check a number of worker processes.
 
     Raises:
-        ConfigurationError: It is negative.
+        ConfigurationError: It is negative, or more than any machine has.
     """
-    require(
-        workers >= 0, f"--workers={workers} must not be negative; 0 works in this process, 2 in two others"
-    )
+    require_integer("--workers", workers, 0, MOST_WORKERS, hint="0 works in this process, 2 in two others.")
 
 
 @contextmanager
@@ -37,7 +38,7 @@ def worker_pool(workers: int) -> Iterator[Executor]:
         workers: Number of processes; 0 runs every job at once in this process (slow, but easy to debug).
 
     Raises:
-        ConfigurationError: `workers` is negative.
+        ConfigurationError: The number is not possible.
     """
     require_workers(workers)
     if workers == 0:
