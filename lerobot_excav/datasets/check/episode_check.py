@@ -55,12 +55,14 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
 
 
 def _mask_problems(episode: EpisodeTable) -> Iterator[str]:
-    """Check the mask under each command: it changes with the command only, is binary and marks something."""
+    """Check the mask under each command: it changes with the command and then only, is binary and marks something."""
     starts = [0, *(frame for frame, _ in episode.schedule)]
     digests = episode.image_digests(MASK_KEY)
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
         if len(set(digests[start:end])) != 1:
             yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
+        if start > 0 and digests[start] == digests[start - 1] and not _corruptions(episode):
+            yield f"the command changes at frame {start}, though the target mask does not"
         mask_img = episode.image(MASK_KEY, start)
         if not np.isin(mask_img, (0, 255)).all():
             values = np.unique(mask_img)[:4].tolist()
@@ -93,11 +95,15 @@ def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:
             problems[episode.index] = (
                 f"starts with another view than episode {untinted[0].index} of the same scene"
             )
-        elif not episode.mask_changes - {OVERLAY}:
+        elif not _corruptions(episode):
             shown = masks.setdefault(episode.image(MASK_KEY, 0).tobytes(), target)
             if shown != target:
                 problems[episode.index] = f"target {target} has the mask of target {shown}"
     return problems
+
+
+def _corruptions(episode: EpisodeTable) -> frozenset[str]:
+    return episode.mask_changes - {OVERLAY}
 
 
 def _views_differ(one: EpisodeTable, other: EpisodeTable) -> bool:

@@ -10,10 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
 
 from lerobot_excav.datasets.format.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.format.pair import Pair
-from lerobot_excav.envs.tasks.registry import env_types
+from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
 from lerobot_excav.envs.tasks.selection import Schedule, checked_schedule
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TaskSettings
-from lerobot_excav.errors import DatasetError, require_choice, require_integer
+from lerobot_excav.errors import ConfigurationError, DatasetError, require, require_choice, require_integer
 
 
 class SessionEpisode(BaseModel):
@@ -68,8 +68,8 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
         was recorded again.
 
     Raises:
-        DatasetError: The file is missing, or a line is not what it should be.
-        ConfigurationError: A line names an unknown environment, or a setting, scene or target that is not possible.
+        DatasetError: The file is missing, or a line is not what it should be: it lacks a field, or names an environment,
+            a setting, a scene or a target that is not possible.
     """
     lines = read_json_lines(path, origin="the robot wrote its session to --robot.session_log")
     episodes = [_episode(line) for line in lines]
@@ -78,13 +78,20 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
 
 def _episode(line: Line) -> SessionEpisode:
     episode = line.read(SessionEpisode, hint="is it a session log of a simulated robot?")
-    place = f"{line.place}: "
-    require_choice(f"{place}env", episode.env, tuple(env_types()))
-    spec = env_types()[episode.env]
-    spec.settings.of(episode.settings, place=place)
-    first = episode.commands[0]
-    if len(first) != 2 or first[0] != 0:
-        raise DatasetError(f"{place}commands={episode.commands!r} must begin with [0, first target]")
-    require_integer(f"{place}commands: target_id", first[1], 0, spec.target_count - 1)
-    checked_schedule(episode.commands[1:], spec.target_count)
+    try:
+        _require_playable(episode)
+    except ConfigurationError as error:
+        raise DatasetError(f"{line.place}: {error}") from None
     return episode
+
+
+def _require_playable(episode: SessionEpisode) -> None:
+    require_choice("env", episode.env, tuple(env_types()))
+    targets = task_of_settings(episode.task_settings).target_count
+    first, *changes = episode.commands
+    require(
+        len(first) == 2 and first[0] == 0,
+        f"commands={episode.commands!r} is not possible; it begins with [0, first target]",
+    )
+    require_integer("commands: target_id", first[1], 0, targets - 1)
+    checked_schedule(changes, targets)

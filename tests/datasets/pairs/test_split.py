@@ -83,5 +83,5 @@ def test_splitting_by_scene_and_by_episode_differ():
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.0])
 def test_a_fraction_out_of_range_is_named(fraction):
-    with pytest.raises(ConfigurationError, match="--eval-fraction="):
+    with pytest.raises(ConfigurationError, match="--eval_fraction="):
         split(index_of([(0, 0), (1, 0)]), "scene", eval_fraction=fraction)

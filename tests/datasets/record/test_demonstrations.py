@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from lerobot.datasets import LeRobotDataset
+import toy_reach.env
 
-from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.pairs.paired_index import build_index
 from lerobot_excav.datasets.record import simulation
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.datasets.record.episode_store import EpisodeStore
@@ -14,6 +14,8 @@ from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.provenance import read_provenance
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.errors import ConfigurationError, DatasetError
+
+from ..toy import CHANGE_FRAME, load, record_toy, toy_settings
 
 
 def contents(root: Path) -> dict[str, object]:
@@ -27,147 +29,143 @@ def contents(root: Path) -> dict[str, object]:
     }
 
 
-def test_frames_read_back_as_they_were_played(paired_dataset, toy_rig, toy_settings):
+@pytest.mark.parametrize("changes", [False, True], ids=["one command", "changed command"])
+def test_frames_read_back_as_they_were_played(request, paired_dataset, changing_datasets, changes):
+    if changes:
+        request.getfixturevalue("command_changes")
     settings = toy_settings(scenes=5)
-    pair = settings.pairs()[5]
-    episode = play_demonstration(toy_rig(), settings, pair)
-    dataset = LeRobotDataset("local/toy", root=paired_dataset, episodes=[5])
-    assert len(dataset) == episode.length
-    for frame in range(episode.length):
-        item = dataset[frame]
+    episode = play_demonstration(settings, settings.pairs()[5])
+    items = list(load(changing_datasets["image"] if changes else paired_dataset, [5]))
+    assert len(items) == episode.length
+    assert episode.target_id.tolist() == [1] * CHANGE_FRAME + [2 if changes else 1] * (
+        len(items) - CHANGE_FRAME
+    )
+    for frame, item in enumerate(items):
         np.testing.assert_array_equal(item["observation.state"], episode.state[frame])
         np.testing.assert_array_equal(item["action"], episode.action[frame])
         np.testing.assert_array_equal(item["excav.task_state"], episode.task_state[frame])
-        for camera, frames in episode.images.items():
-            image = (item[f"observation.images.{camera}"].numpy() * 255).round().astype(np.uint8)
-            np.testing.assert_array_equal(image.transpose(1, 2, 0), frames[frame])
-        assert item["excav.pair_uid"] == pair.uid
-        assert (item["excav.soil"], item["excav.fidelity"]) == (settings.soil, settings.fidelity)
-        assert (int(item["excav.scene_id"]), int(item["excav.target_id"])) == (pair.scene_id, pair.target_id)
+        assert int(item["excav.target_id"]) == episode.target_id[frame]
+        assert item["excav.pair_uid"] == episode.pair.uid == "toy_reach/train/1/1"
+        assert (item["excav.table"], item["excav.mask_source"]) == ("wood", "oracle")
+        assert int(item["excav.scene_id"]) == 1
         assert bool(item["excav.success"])
-        assert item["task"] == "Dig where the mask points."
+        assert item["task"] == "Slide to the spot that the mask marks."
 
 
-def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, record_toy, toy_rig, monkeypatch):
+def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, monkeypatch, command_changes):
     record_toy(tmp_path / "whole")
     played = []
     play = simulation.play_demonstration
 
-    def interrupted(rig, settings, pair):
+    def interrupted(settings, pair):
         if len(played) == 5:
             raise KeyboardInterrupt
         played.append(pair)
-        return play(rig, settings, pair)
+        return play(settings, pair)
 
     monkeypatch.setattr(simulation, "play_demonstration", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record_toy(tmp_path / "broken")
     assert not (tmp_path / "broken").exists()
-    monkeypatch.setattr(simulation, "play_demonstration", lambda *a: (played.append(a[2]), play(*a))[1])
+    monkeypatch.setattr(simulation, "play_demonstration", lambda *a: (played.append(a[1]), play(*a))[1])
     record_toy(tmp_path / "broken", resume=True)
     assert len(played) == len(set(played)) == 12
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
     assert not (tmp_path / "broken.partial").exists()
 
 
-def test_half_written_episodes_are_played_again(tmp_path, toy_rig, toy_settings):
-    settings = toy_settings()
-    pair = settings.pairs()[0]
-    store = EpisodeStore(tmp_path)
-    (tmp_path / "excavator-train-0-0.npz").write_bytes(b"torn")
-    assert store.outcome(pair) is None
+def test_half_written_episodes_are_played_again(tmp_path):
+    (tmp_path / "toy_reach-train-0-0.npz").write_bytes(b"torn")
+    assert EpisodeStore(tmp_path).outcome(toy_settings().pairs()[0]) is None
 
 
-def test_failed_episodes_are_left_out_and_listed(tmp_path, record_toy):
-    summary = record_toy(tmp_path / "d", first_scene=3, scenes=1)
-    assert summary.episodes == 3
-    assert summary.failures == ["excavator/train/3/1"]
-    outcomes = read_provenance(tmp_path / "d").outcomes
-    assert [outcome["kept"] for outcome in outcomes] == [True, False, True, True]
+@pytest.mark.parametrize("keep", [False, True])
+def test_failed_episodes_are_listed_and_kept_on_request_only(tmp_path, keep):
+    summary = record_toy(tmp_path / "d", first_scene=3, scenes=1, keep_failures=keep)
+    assert summary.episodes == 3 + keep
+    assert summary.failures == ["toy_reach/train/3/1"]
+    assert [outcome["kept"] for outcome in read_provenance(tmp_path / "d").outcomes] == [
+        True,
+        keep,
+        True,
+        True,
+    ]
+    assert build_index(tmp_path / "d")["success"].tolist() == [True, *[False] * keep, True, True]
 
 
-def test_failed_episodes_can_be_kept_and_are_marked(tmp_path, record_toy):
-    record_toy(tmp_path / "d", first_scene=3, scenes=1, keep_failures=True)
-    dataset = LeRobotDataset("local/toy", root=tmp_path / "d")
-    assert dataset.num_episodes == 4
-    assert {bool(value) for value in dataset.hf_dataset["excav.success"]} == {True, False}
+def test_an_episode_whose_mask_is_missing_is_never_kept(tmp_path, monkeypatch):
+    true_mask = toy_reach.env.ReachEnv.true_mask
+    monkeypatch.setattr(
+        toy_reach.env.ReachEnv,
+        "true_mask",
+        lambda env, command: true_mask(env, command) & (command.target_id != 2),
+    )
+    summary = record_toy(tmp_path / "d", scenes=1, keep_failures=True)
+    assert (summary.episodes, summary.failures) == (3, ["toy_reach/train/0/2"])
+    outcome = read_provenance(tmp_path / "d").outcomes[2]
+    assert (outcome["mask_missing"], outcome["kept"]) == (True, False)
 
 
-def test_nothing_is_written_when_every_episode_fails(tmp_path, toy_rig, toy_settings, monkeypatch):
-    rig, settings = toy_rig(), toy_settings(first_scene=3, scenes=1)
-    monkeypatch.setattr(type(settings), "pairs", lambda self: [Pair("excavator", "train", 3, 1)])
+def test_nothing_is_written_when_every_episode_fails(tmp_path):
+    settings = {"env": {"episode_length": 1}, "scenes": 1, "targets": 1}
     with pytest.raises(DatasetError, match=r"none of 1 .* remove \S*d\.partial and record again"):
-        record_demonstrations(settings, tmp_path / "d", workers=0, rig=rig, show_progress=False)
+        record_toy(tmp_path / "d", **settings)
     assert not (tmp_path / "d").exists()
 
 
-def test_an_existing_dataset_is_not_overwritten(paired_dataset, record_toy):
+def test_a_finished_dataset_is_neither_overwritten_nor_changed(paired_dataset):
     before = contents(paired_dataset)
     with pytest.raises(DatasetError, match="exists"):
         record_toy(paired_dataset, scenes=5)
-    assert contents(paired_dataset) == before
-
-
-def test_resuming_a_finished_run_does_nothing(paired_dataset, record_toy):
-    before = contents(paired_dataset)
+    with pytest.raises(ConfigurationError, match="--seed=7 differs from the started run, which has 0"):
+        record_toy(paired_dataset, scenes=5, seed=7, resume=True)
     assert record_toy(paired_dataset, scenes=5, resume=True).episodes == 19
     assert contents(paired_dataset) == before
 
 
-def test_resuming_with_another_setting_names_it(paired_dataset, record_toy):
-    with pytest.raises(ConfigurationError, match="--seed=7 differs from the started run, which has 0"):
-        record_toy(paired_dataset, scenes=5, seed=7, resume=True)
-
-
-def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(
-    tmp_path, record_toy, toy_settings
-):
+def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(tmp_path):
     with PartialRun(tmp_path / "d", toy_settings(), resume=False):
-        pass
+        with pytest.raises(DatasetError, match="another process"):
+            record_toy(tmp_path / "d", resume=True)
     with pytest.raises(DatasetError, match="--resume"):
         record_toy(tmp_path / "d")
-    with pytest.raises(ConfigurationError, match="--soil=gravel differs"):
-        record_toy(tmp_path / "d", soil="gravel", resume=True)
-
-
-def test_a_switch_that_differs_is_named_as_the_user_writes_it(toy_settings):
-    with pytest.raises(ConfigurationError, match="does not have --keep-failures; continue it without"):
-        toy_settings(keep_failures=True).require_same(toy_settings())
-
-
-def test_a_negative_number_of_workers_leaves_no_folder(tmp_path, toy_settings):
-    with pytest.raises(ConfigurationError, match="--workers=-1"):
-        record_demonstrations(toy_settings(), tmp_path / "d", workers=-1)
-    assert not list(tmp_path.iterdir())
-
-
-def test_two_runs_cannot_write_the_same_dataset(tmp_path, record_toy, toy_settings):
-    with (
-        PartialRun(tmp_path / "d", toy_settings(), resume=False),
-        pytest.raises(DatasetError, match="another process"),
+    for changes, message in (
+        ({"env": {"table": "ice"}}, "--env.table=ice differs from the started run, which has wood"),
+        ({"keep_failures": True}, "--keep_failures=true differs .* continue it with --keep_failures=false"),
     ):
+        with pytest.raises(ConfigurationError, match=message):
+            record_toy(tmp_path / "d", resume=True, **changes)
+
+
+def test_a_run_that_another_version_began_is_not_continued(tmp_path):
+    with PartialRun(tmp_path / "d", toy_settings(), resume=False) as partial:
+        settings = partial.folder / "settings.json"
+    settings.write_text(settings.read_text().replace('version": 1', 'version": 7'))
+    with pytest.raises(ConfigurationError, match="is of version 7 of the simulation"):
         record_toy(tmp_path / "d", resume=True)
 
 
-def test_every_episode_has_its_own_seed_whatever_is_recorded_with_it(tmp_path, paired_dataset, record_toy):
-    record_toy(tmp_path / "one", first_scene=2, scenes=1, targets=1)
-    alone = LeRobotDataset("local/toy", root=tmp_path / "one")
-    among = LeRobotDataset("local/toy", root=paired_dataset, episodes=[10])
-    assert alone[0]["excav.pair_uid"] == among[0]["excav.pair_uid"]
-    np.testing.assert_array_equal(alone[0]["action"], among[0]["action"])
+@pytest.mark.parametrize("workers", [-1, 10**6])
+def test_an_impossible_number_of_workers_leaves_no_folder(tmp_path, workers):
+    with pytest.raises(ConfigurationError, match=f"--workers={workers}"):
+        record_demonstrations(toy_settings(), tmp_path / "d", workers=workers)
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_episode_has_its_own_seed_whatever_is_recorded_with_it(tmp_path, paired_dataset):
+    among = load(paired_dataset, [10])[0]
+    for name, changes in (("alone", {}), ("otherwise", {"seed": 1})):
+        record_toy(tmp_path / name, first_scene=2, scenes=1, targets=1, **changes)
+    alone, otherwise = (load(tmp_path / name)[0] for name in ("alone", "otherwise"))
+    assert alone["excav.pair_uid"] == among["excav.pair_uid"]
+    np.testing.assert_array_equal(alone["action"], among["action"])
+    assert not np.array_equal(otherwise["action"], among["action"])
     seeds = [tuple(outcome["seed"]) for outcome in read_provenance(paired_dataset).outcomes]
     assert len(set(seeds)) == 20
-
-
-def test_the_seed_changes_the_actions(tmp_path, record_toy, paired_dataset):
-    record_toy(tmp_path / "d", scenes=1, targets=1, seed=1)
-    first = LeRobotDataset("local/toy", root=tmp_path / "d")[0]["action"]
-    assert not np.array_equal(
-        first, LeRobotDataset("local/toy", root=paired_dataset, episodes=[0])[0]["action"]
-    )
 
 
 def test_provenance_is_readable_json(paired_dataset):
     record = json.loads((paired_dataset / "meta" / "excav_demonstrations.json").read_text())
     assert record["operator"] == "scripted"
-    assert record["episodes"][0]["metrics"] == {"retained_mass_kg": 600.0}
+    assert record["settings"]["env.table"] == "wood"
+    assert record["episodes"][0]["metrics"]["commands"] == [[0, 0]]
