@@ -107,10 +107,10 @@ def parse_arguments[Parsed: Arguments](
 
 
 def _require_readable(word: str, hint: str) -> None:
-    """Raise unless the value of an option is YAML, which draccus takes it for."""
+    """Raise unless the value of an option is YAML, which draccus takes it for; argparse loses the value `--`."""
     name, _, text = word.partition("=") if word.startswith("-") else ("", "", word)
     try:
-        parse_string(text)
+        parse_string("[" if text == "--" else text)
     except Exception as error:  # whatever YAML takes offence at
         problem = " ".join(str(error).split())
         raise ConfigurationError(f"{name}={text!r} cannot be read ({problem}); {hint}") from None

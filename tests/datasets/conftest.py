@@ -30,7 +30,7 @@ def paired_dataset(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def changing_datasets(tmp_path_factory):
-    """Two scenes with four targets each, by storage; the command changes in every episode. Not to be changed by tests."""
+    """Two scenes with four targets, by storage; the command changes in every episode. Not to be changed by tests."""
     folder = tmp_path_factory.mktemp("changing")
     with pytest.MonkeyPatch.context() as patch:
         command_next_spot(patch)

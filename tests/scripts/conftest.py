@@ -1,5 +1,5 @@
-"""The toy datasets of `tests/datasets`, for the commands that work on datasets."""
+"""The datasets of `tests/datasets`, for the commands that work on them."""
 
-from ..datasets.conftest import arm_dataset, paired_dataset, record_toy, toy_rig, toy_settings
+from ..datasets.conftest import changing_datasets, paired_dataset, spot_out_of_reach
 
-__all__ = ["arm_dataset", "paired_dataset", "record_toy", "toy_rig", "toy_settings"]
+__all__ = ["changing_datasets", "paired_dataset", "spot_out_of_reach"]

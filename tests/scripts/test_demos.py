@@ -9,40 +9,56 @@ import time
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from lerobot.datasets import LeRobotDataset
 
+from lerobot_excav.datasets.pairs.paired_index import build_index
+from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.scripts.main import main
 
-SHORT = ("--scenes=2", "--targets=2", "--episode-length=4", "--keep-failures", "--height=32", "--width=32")
+from ..datasets.toy import load
 
-
-def command(env, out, *options):
-    module = [sys.executable, "-m", "lerobot_excav.scripts.main"]
-    return [*module, "demos", f"--env={env}", *SHORT, f"--out={out}", *options]
+SIZE = {"observation_height": 32, "observation_width": 32}
+SHORT = ("--scenes=2", "--targets=2", "--keep_failures", "--env.episode_length=4",
+         *(f"--env.{name}={size}" for name, size in SIZE.items()))  # fmt: skip
+OPTIONS = {
+    "excavator": ("--env.type=excavator", *SHORT),
+    "fr5_grasp": ("--env.type=fr5_grasp", "--env.retarget_frame=2", *SHORT),
+}
 
 
 def frames(root):
     return [row for path in sorted(root.glob("data/*/*.parquet")) for row in pq.read_table(path).to_pylist()]
 
 
-@pytest.fixture(scope="module", params=["excavator", "fr5_grasp"])
-def env(request):
+def picture(item, camera):
+    return (item[f"observation.images.{camera}"].numpy() * 255).round().transpose(1, 2, 0)
+
+
+@pytest.fixture(scope="module", params=OPTIONS)
+def env_type(request):
     return request.param
 
 
 @pytest.fixture(scope="module")
-def whole(env, tmp_path_factory):
-    """Record four short episodes in this process."""
+def whole(env_type, tmp_path_factory):
+    """Record four short episodes in this process; the arm's command changes within each."""
     out = tmp_path_factory.mktemp("demos") / "whole"
-    assert main(["demos", f"--env={env}", *SHORT, f"--out={out}", "--workers=0"]) == 0
+    assert main(["demos", *OPTIONS[env_type], f"--out={out}", "--workers=0"]) == 0
     return out
 
 
 @pytest.mark.slow
-def test_a_killed_run_continues_to_the_same_dataset_with_other_workers(env, whole, tmp_path):
+def test_a_killed_run_continues_to_the_same_dataset_with_other_workers(env_type, whole, tmp_path):
     out = tmp_path / "killed"
+    command = [
+        sys.executable,
+        "-m",
+        "lerobot_excav.scripts.main",
+        "demos",
+        *OPTIONS[env_type],
+        f"--out={out}",
+    ]
     log = (tmp_path / "log").open("wb")
-    run = subprocess.Popen(command(env, out, "--workers=2"), start_new_session=True, stdout=log, stderr=log)
+    run = subprocess.Popen([*command, "--workers=2"], start_new_session=True, stdout=log, stderr=log)
     deadline = time.monotonic() + 600
     while not list(tmp_path.glob("killed.partial/episodes/*.json")):
         assert time.monotonic() < deadline, "no episode was finished"
@@ -52,40 +68,72 @@ def test_a_killed_run_continues_to_the_same_dataset_with_other_workers(env, whol
     run.wait()
     assert not out.exists()
 
-    assert subprocess.run(command(env, out, "--workers=1", "--resume"), check=False).returncode == 0
+    assert subprocess.run([*command, "--workers=1", "--resume"], check=False).returncode == 0
     assert frames(out) == frames(whole)
     assert not (tmp_path / "killed.partial").exists()
 
 
-def test_the_summary_says_what_was_left_out(env, whole, capsys):
-    assert main(["demos", f"--env={env}", *SHORT, f"--out={whole}", "--resume"]) == 0
+def test_the_summary_says_what_was_left_out(env_type, whole, capsys):
+    assert main(["demos", *OPTIONS[env_type], f"--out={whole}", "--resume"]) == 0
     output = capsys.readouterr().out
     assert "4 episodes of 2 scenes" in output
-    assert f"4 episodes without success (kept): {env}/train/0/0 {env}/train/0/1" in output
+    assert f"4 episodes without success (kept): {env_type}/train/0/0 {env_type}/train/0/1" in output
     assert "x real time" in output
+    assert main(["demos", *OPTIONS[env_type], f"--out={whole}"]) == 2
+    assert "exists" in capsys.readouterr().err
 
 
-def test_recorded_frames_have_the_environments_pictures(env, whole):
-    from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-
-    item = LeRobotDataset("local/whole", root=whole, video_backend="pyav")[0]
-    settings = DemonstrationSettings.of(env, height=32, width=32)
-    played = settings.environment.rig().environment(settings)
-    observation, _ = played.reset(options={"scene_id": 0, "target_id": 0})
-    played.close()
-    for camera, picture in observation["pixels"].items():
-        recorded = (item[f"observation.images.{camera}"].numpy() * 255).round().transpose(1, 2, 0)
+def test_recorded_frames_have_the_environments_pictures(env_type, whole):
+    spec = env_types()[env_type]
+    item = load(whole)[0]
+    env = spec.make_env(**SIZE)
+    observation, _ = env.reset(options={"scene_id": 0, "target_id": 0})
+    env.close()
+    for camera, expected in observation["pixels"].items():
         # A video's conversion of colours rounds; black and white stay what they are.
-        is_exact = settings.storage == "image" or camera == "target_mask"
-        np.testing.assert_allclose(recorded, picture, atol=0 if is_exact else 2)
+        is_exact = spec.storage == "image" or camera == "target_mask"
+        np.testing.assert_allclose(picture(item, camera), expected, atol=0 if is_exact else 2)
     np.testing.assert_array_equal(item["observation.state"], observation["agent_pos"])
 
 
-def test_a_recorded_dataset_replays_and_passes_the_check(whole, capsys):
+def test_a_recorded_dataset_replays_and_passes_the_check(env_type, whole, capsys):
     assert main(["qc", str(whole), "--replays=4"]) == 0
     assert "4 of 4 episodes passed; 4 of them were replayed" in capsys.readouterr().out
+    index = build_index(whole)
+    changes = env_type == "fr5_grasp"
+    assert (index["commands"] == 1 + changes).all()
+    assert ((index["final_target_id"] != index["target_id"]) == changes).all()
 
 
-def test_an_existing_folder_is_an_error_of_usage(env, whole, capsys):
-    assert main(["demos", f"--env={env}", *SHORT, f"--out={whole}"]) == 2
-    assert "exists" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("options", "settings", "words"),
+    [
+        (["--env.mask_condition=zero"], {"mask_condition": "zero"}, "oracle, zero"),
+        (["--env.mask_condition=random"], {"mask_condition": "random"}, "oracle, random"),
+        (
+            ["--env.mask_noise=dilate", "--env.mask_noise_px=2"],
+            {"mask_noise": "dilate", "mask_noise_px": 2},
+            "oracle, dilate 2 px",
+        ),
+        (
+            ["--env.target_overlay", "--env.mask_condition=mismatched"],
+            {"target_overlay": True, "mask_condition": "mismatched"},
+            "oracle, mismatched, as overlay",
+        ),
+    ],
+)
+def test_options_of_the_mask_reach_the_recorded_pictures(tmp_path, options, settings, words):
+    toy = ["--env.type=toy_reach", "--scenes=1", "--targets=1", "--workers=0", f"--out={tmp_path / 'd'}"]
+    assert main(["demos", *toy, *(f"--env.{name}=32" for name in SIZE), *options]) == 0
+    item = load(tmp_path / "d")[0]
+    assert item["excav.mask_source"] == words
+    shown, plain = (
+        env_types()["toy_reach"]
+        .make_env(**SIZE, **changes)
+        .reset(options={"scene_id": 0, "target_id": 0})[0]["pixels"]
+        for changes in (settings, {})
+    )
+    for camera, expected in shown.items():
+        np.testing.assert_array_equal(picture(item, camera), expected)
+    changed = {camera for camera in shown if not np.array_equal(shown[camera], plain[camera])}
+    assert changed == ({"target_mask", "main"} if "target_overlay" in settings else {"target_mask"})

@@ -18,12 +18,18 @@ def output(capsys):
     return run
 
 
-def test_missing_targets_are_listed(paired_dataset, output):
+def test_the_index_is_rewritten_and_described(paired_dataset, output):
+    before = build_index(paired_dataset)
     text = output(paired_dataset)
-    assert "19 episodes" in text
-    assert "soil: sand, 19 episodes" in text
-    assert "scenes: 5, of which 4 with all 4 targets" in text
-    assert "missing: excavator/train/3 lacks target [1]" in text
+    assert build_index(paired_dataset).equals(before)
+    for line in (
+        "19 episodes",
+        "table: wood, 19 episodes",
+        "scenes: 5, of which 4 with all 4 targets",
+        "missing: toy_reach/train/3 lacks target [1]",
+        "final distance: 0.0",
+    ):
+        assert line in text
     assert "lerobot-train" not in text
 
 
@@ -34,50 +40,38 @@ def test_flags_alone_fit_into_a_command_line(paired_dataset, output):
     assert ratio == f"--dataset.eval_split={3.5 / 12}"
 
 
-def test_the_printed_command_quotes_brackets_for_the_shell(paired_dataset, output):
-    assert "'--dataset.episodes=[" in output(paired_dataset, "--split=episode")
-
-
 @pytest.mark.parametrize(
-    ("options", "count"),
+    ("options", "counts"),
     [
-        (["--select=paired"], 16),
-        (["--select=non-paired"], 5),
-        (["--select=balanced"], 16),
-        (["--select=balanced", "--episodes=8"], 8),
-        (["--select=all", "--episodes=7"], 7),
+        (["--select=paired"], (16, 0)),
+        (["--select=non-paired"], (5, 0)),
+        (["--select=balanced"], (16, 0)),
+        (["--select=balanced", "--episodes=8"], (8, 0)),
+        (["--select=all", "--episodes=7"], (7, 0)),
+        (["--include_failures"], (19, 0)),
+        (["--split=episode", "--eval_fraction=0.4"], (11, 8)),
     ],
 )
-def test_selections_are_counted(paired_dataset, output, options, count):
-    assert f"chosen: {count} episodes to train on, 0 held out" in output(paired_dataset, *options)
+def test_selections_are_counted_and_quoted_for_the_shell(paired_dataset, output, options, counts):
+    text = output(paired_dataset, *options)
+    assert "chosen: {} episodes to train on, {} held out".format(*counts) in text
+    assert "'--dataset.episodes=[" in text
 
 
-def test_seed_and_fraction_reach_the_split(paired_dataset, output):
+def test_the_seed_reaches_the_split(paired_dataset, output):
     texts = {output(paired_dataset, "--split=scene", f"--seed={seed}", "--flags") for seed in range(5)}
     assert len(texts) > 1
-    assert "11 episodes to train on, 8 held out" in output(
-        paired_dataset, "--split=episode", "--eval-fraction=0.4"
-    )
-
-
-def test_out_and_skipping_need_a_session(paired_dataset, output, tmp_path):
-    assert "--session only" in output(paired_dataset, f"--out={tmp_path / 'x'}")
-    assert "--session only" in output(paired_dataset, "--skip-restarted")
 
 
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ("--eval-fraction=0.3", "--eval-fraction=0.3 has no effect without --split"),
+        ("--out=x", "--out is of use with --session only"),
+        ("--skip_restarted", "--skip_restarted is of use with --session only"),
+        ("--eval_fraction=0.3", "--eval_fraction=0.3 has no effect without --split"),
         ("--seed=0", "--seed=0 has no effect without a choice"),
     ],
 )
 def test_options_without_effect_are_refused(paired_dataset, output, option, message):
     assert message in output(paired_dataset, option)
     assert message in output(paired_dataset, option, "--flags")
-
-
-def test_indexing_rewrites_the_index_only(paired_dataset, output):
-    before = build_index(paired_dataset)
-    output(paired_dataset)
-    assert build_index(paired_dataset).equals(before)

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
@@ -16,6 +17,11 @@ def test_help_of_the_whole_lists_every_command(capsys):
     assert all(f"\n  {name} " in text for name in COMMANDS)
 
 
+def test_the_version_is_told(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"lerobot-excav {version('lerobot_env_excav')}\n"
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_of_a_command_has_examples_that_name_it(command, capsys):
     with pytest.raises(SystemExit) as exit_info:
@@ -23,7 +29,7 @@ def test_help_of_a_command_has_examples_that_name_it(command, capsys):
     assert exit_info.value.code == 0
     text = capsys.readouterr().out
     assert "Examples:" in text
-    assert f"lerobot-excav {command} " in text
+    assert f"lerobot-excav {command}" in text.partition("Examples:")[2]
 
 
 def test_help_loads_nothing_heavy():
@@ -31,7 +37,7 @@ def test_help_loads_nothing_heavy():
         "import sys; from lerobot_excav.scripts.main import main\n"
         "try: main(['--help'])\n"
         "except SystemExit: pass\n"
-        "sys.exit(bool({'torch', 'lerobot', 'mujoco', 'numba', 'numpy'} & set(sys.modules)))"
+        "sys.exit(bool({'torch', 'lerobot', 'mujoco', 'numba', 'pandas'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode == 0
 
@@ -44,19 +50,33 @@ def test_an_unknown_command_is_refused(capsys):
 
 
 def test_an_error_is_one_line_and_exit_code_2(capsys, tmp_path):
-    assert main(["qc", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("lerobot-excav qc: ")
-    assert error.count("\n") == 1
+    (tmp_path / "file").write_text("")
+    for folder, problem in (
+        (tmp_path, f"{tmp_path} is not a LeRobot dataset: it has no meta/info.json"),
+        (tmp_path / "file", f"{tmp_path / 'file/meta/info.json'}: Not a directory"),
+    ):
+        assert main(["qc", str(folder)]) == 2
+        assert capsys.readouterr().err == f"lerobot-excav qc: {problem}\n"
+    for command, missing in (
+        ("qc", "the folder of a dataset"),
+        ("demos", "--out"),
+        ("operator", "--metrics"),
+    ):
+        assert main([command]) == 2
+        assert f"{missing} is missing" in capsys.readouterr().err
 
 
-def test_ctrl_c_ends_with_130(monkeypatch, capsys):
-    def interrupt(_):
-        raise KeyboardInterrupt
+@pytest.mark.parametrize(
+    ("error", "code", "text"),
+    [(KeyboardInterrupt(), 130, "interrupted"), (DatasetError("damaged"), 2, "damaged")],
+)
+def test_ctrl_c_and_errors_of_this_package_have_their_own_codes(monkeypatch, capsys, error, code, text):
+    def fail(_):
+        raise error
 
-    monkeypatch.setattr(report, "run", interrupt)
-    assert main(["report", "x"]) == 130
-    assert "interrupted" in capsys.readouterr().err
+    monkeypatch.setattr(report, "run", fail)
+    assert main(["report", "x"]) == code
+    assert capsys.readouterr().err.strip() == f"lerobot-excav report: {text}"
 
 
 def test_a_defect_of_the_program_keeps_its_traceback(monkeypatch):
@@ -66,20 +86,3 @@ def test_a_defect_of_the_program_keeps_its_traceback(monkeypatch):
     monkeypatch.setattr(report, "run", fail)
     with pytest.raises(RuntimeError, match="a bug"):
         main(["report", "x"])
-
-
-def test_errors_of_this_package_are_what_is_caught(monkeypatch, capsys):
-    def fail(_):
-        raise DatasetError("damaged")
-
-    monkeypatch.setattr(report, "run", fail)
-    assert main(["report", "x"]) == 2
-    assert capsys.readouterr().err == "lerobot-excav report: damaged\n"
-
-
-def test_an_error_of_the_system_names_the_file_in_one_line(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    assert main(["qc", str(tmp_path / "file")]) == 2
-    assert (
-        capsys.readouterr().err == f"lerobot-excav qc: {tmp_path / 'file/meta/info.json'}: Not a directory\n"
-    )

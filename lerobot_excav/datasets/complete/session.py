@@ -68,7 +68,7 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
         was recorded again.
 
     Raises:
-        DatasetError: The file is missing, or a line is not what it should be: it lacks a field, or names an environment,
+        DatasetError: The file is missing, or a line is not what it should be: it lacks a field, or has an environment,
             a setting, a scene or a target that is not possible.
     """
     lines = read_json_lines(path, origin="the robot wrote its session to --robot.session_log")

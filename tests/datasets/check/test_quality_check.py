@@ -17,7 +17,7 @@ from ..toy import MAIN, MASK, STATE, load, record_toy
 
 @pytest.fixture
 def tampered(paired_dataset, tmp_path):
-    """Copy the dataset with one column changed: `change(values, rows)` edits a list; `rows[e]` are those of an episode."""
+    """Copy the dataset with a column changed: `change(values, rows)` edits a list; `rows[e]` are those of an episode."""
 
     def tamper(key, change):
         root = tmp_path / "tampered"
@@ -111,9 +111,9 @@ def test_contradicting_columns_are_refused(tampered):
         check_dataset(tampered("excav.scene_id", change))
 
 
-def whole_episode(value):
+def set_all(episode, value):
     def change(values, rows):
-        for row in rows[5]:
+        for row in rows[episode]:
             values[row] = value
 
     return change
@@ -124,8 +124,8 @@ def whole_episode(value):
     [
         (STATE, set_element(5, 3, 1, 7.0), "replay leaves the recorded state at frame 3"),
         ("excav.task_state", set_element(5, 3, 1, 7.0), "replay gives another frames_on_target (by up to 7)"),
-        ("excav.success", whole_episode(False), "replay ends with success=True, recorded False"),
-        ("excav.table", whole_episode("ice"), "replay leaves the recorded state at frame 1"),
+        ("excav.success", set_all(5, value=False), "replay ends with success=True, recorded False"),
+        ("excav.table", set_all(5, "ice"), "replay leaves the recorded state at frame 1"),
     ],
 )
 def test_a_replay_that_deviates_is_found(tampered, key, change, message):

@@ -124,9 +124,9 @@ def test_a_finished_dataset_is_neither_overwritten_nor_changed(paired_dataset):
 
 
 def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(tmp_path):
-    with PartialRun(tmp_path / "d", toy_settings(), resume=False):
-        with pytest.raises(DatasetError, match="another process"):
-            record_toy(tmp_path / "d", resume=True)
+    started = PartialRun(tmp_path / "d", toy_settings(), resume=False)
+    with started, pytest.raises(DatasetError, match="another process"):
+        record_toy(tmp_path / "d", resume=True)
     with pytest.raises(DatasetError, match="--resume"):
         record_toy(tmp_path / "d")
     for changes, message in (

@@ -1,0 +1,163 @@
+"""Command lines: every option is explained, takes what it says, and is refused by its name with anything else."""
+
+import importlib
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+import toy_reach  # noqa: F401 - registers the example task
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lerobot_excav.envs.tasks.registry import env_types
+from lerobot_excav.envs.tasks.setting import declared_settings, setting
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.scripts.arguments import Arguments, parse_arguments
+from lerobot_excav.scripts.main import COMMANDS
+
+COMMAND_ARGUMENTS = {
+    name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS
+}
+
+
+@dataclass(kw_only=True)
+class Lunch(Arguments):
+    POSITIONAL: ClassVar[str] = "table"
+
+    table: Path | None = setting("Where", default=None)
+    dish: str = setting("What", default="soup", choices=("soup", "rice"))
+    plates: int = setting("How many, 100 % of them clean", default=1, low=1, high=9)
+    hot: bool = setting("Whether it is hot", default=False)
+
+
+def parse(*argv, kind=Lunch, command="lunch"):
+    return parse_arguments(kind, argv, command=command, description="Eat.")
+
+
+@pytest.mark.parametrize(
+    ("argv", "expected"),
+    [
+        ([], Lunch()),
+        (["t"], Lunch(table=Path("t"))),
+        (
+            ["t", "--dish=rice", "--plates=3", "--hot=true"],
+            Lunch(table=Path("t"), dish="rice", plates=3, hot=True),
+        ),
+        (["--plates", "3", "--hot"], Lunch(plates=3, hot=True)),
+        (["--hot", "--plates=3"], Lunch(plates=3, hot=True)),
+        (["--hot=false"], Lunch()),
+    ],
+)
+def test_words_become_arguments(argv, expected):
+    assert parse(*argv) == expected
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (
+            ["--dessert=3"],
+            r"unrecognized arguments: --dessert=3; `lerobot-excav lunch --help` lists the options",
+        ),
+        (["--plate=3"], "unrecognized arguments: --plate=3"),  # no guessing of shortened names
+        (["--plates"], "--plates: expected one argument"),
+        (["--plates="], "plates.*Couldn't parse ''"),
+        (["--plates=10"], "--plates=10 is not possible; give a whole number from 1 to 9"),
+        (["--plates=2.5"], "plates.*Couldn't parse '2.5' into an int"),
+        (["--dish=stone"], "--dish='stone' is not possible; give one of soup, rice"),
+        (["--dish=["], r"--dish='\[' cannot be read"),
+        (["--dish=--"], "--dish='--' cannot be read"),
+        (["--hot=very"], "hot.*Couldn't parse 'very' into a bool"),
+        (["a", "b"], "one table is needed, not 2: a b"),
+        (["--plates=3", "a"], "unrecognized arguments: a"),
+    ],
+)
+def test_what_cannot_be_parsed_is_named(argv, message):
+    with pytest.raises(ConfigurationError, match=message):
+        parse(*argv)
+
+
+def test_a_word_before_the_options_of_a_command_without_one_is_refused():
+    with pytest.raises(ConfigurationError, match="'x' has no option before it"):
+        parse("x", kind=COMMAND_ARGUMENTS["demos"], command="demos")
+
+
+def help_of(command, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        parse("--help", kind=COMMAND_ARGUMENTS[command], command=command)
+    assert exit_info.value.code == 0
+    return " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_explains_every_option_with_its_allowed_values(command, capsys):
+    text = help_of(command, capsys)
+    kind = COMMAND_ARGUMENTS[command]
+    described = [("--", kind)]
+    if "--env.fps " in text:
+        described += [("--env.", spec.settings) for spec in env_types().values()]
+    for prefix, cls in described:
+        for name, allowed in declared_settings(cls).items():
+            assert f"{prefix}{name} " in text
+            assert not allowed.words or f"Allowed: {allowed.words}" in text
+    assert "type: ignore" not in text
+
+
+@pytest.mark.parametrize("command", ["demos", "operator", "bench"])
+def test_help_lists_every_environment(command, capsys):
+    assert f"--env.type {{{','.join(env_types())}}}" in help_of(command, capsys)
+
+
+def test_an_environment_is_chosen_with_its_own_settings():
+    parsed = parse(
+        "--env.type=toy_reach",
+        "--env.table=ice",
+        "--env.fps=5",
+        "--scenes=2",
+        kind=COMMAND_ARGUMENTS["demos"],
+    )
+    assert (parsed.env.ENV_TYPE, parsed.env.table, parsed.env.fps, parsed.scenes) == (
+        "toy_reach",
+        "ice",
+        5,
+        2,
+    )
+    with pytest.raises(ConfigurationError, match=r"`soil` are not valid for --env.type=toy_reach"):
+        parse("--env.type=toy_reach", "--env.soil=sand", kind=COMMAND_ARGUMENTS["demos"])
+    with pytest.raises(ConfigurationError, match=r"'lathe'.*'excavator', 'fr5_grasp', 'toy_reach'"):
+        parse("--env.type=lathe", kind=COMMAND_ARGUMENTS["demos"])
+
+
+BAD_TEXTS = (
+    r"0 -1 nan inf 1e400 null true typo [ [1,a] {} *x 2026-01-01 2026-13-45 @ !!python/object:x a:b \ ' --"
+)
+bad_texts = st.sampled_from([*BAD_TEXTS.split(), "", "a: b", "\x00", "9" * 30, "9" * 5000]) | st.text(
+    max_size=6
+)
+
+OPTIONS = [
+    (command, "", field.name)
+    for command, kind in COMMAND_ARGUMENTS.items()
+    for field in fields(kind)
+    if field.name not in ("env", kind.POSITIONAL)
+] + [
+    ("demos", env_type, name)
+    for env_type, spec in env_types().items()
+    for name in declared_settings(spec.settings)
+]
+
+
+@settings(max_examples=200)
+@given(option=st.sampled_from(OPTIONS), text=bad_texts)
+def test_a_bad_value_is_refused_in_one_line_by_the_name_of_its_option(option, text):
+    command, env_type, name = option
+    argv = [f"--env.type={env_type}", f"--env.{name}={text}"] if env_type else [f"--{name}={text}"]
+    try:
+        parse(*argv, kind=COMMAND_ARGUMENTS[command], command=command)
+    except ConfigurationError as error:
+        problem = str(error)
+    else:
+        return
+    assert name in problem
+    assert "\n" not in problem
