@@ -95,7 +95,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     def _start(self, scene_id: int, target_id: int) -> None:
         scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)
-        self.worksite.reset(joint_pos=scene.joint_pos, heights_m=scene.heights_m, appearance=scene.appearance)
+        self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW, axes
+from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 
 HEIGHT, WIDTH = 96, 128
@@ -10,7 +10,7 @@ HEIGHT, WIDTH = 96, 128
 
 def project(pose, points_w):
     """Image coordinates (column, row) of world points at the default image size."""
-    local = (np.atleast_2d(points_w) - pose.position) @ axes(pose)
+    local = (np.atleast_2d(points_w) - pose.position) @ pose.axes
     focal = 0.5 * HEIGHT / np.tan(0.5 * np.radians(pose.fovy_deg))
     return np.stack(
         [WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1
@@ -24,7 +24,7 @@ def in_picture(pose, points_w):
 
 @pytest.mark.parametrize("pose", [MAIN, CAB, OVERVIEW])
 def test_camera_axes_are_a_right_handed_frame_that_keeps_up_up(pose):
-    rotation = axes(pose)
+    rotation = pose.axes
     np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
     assert rotation[2, 1] > 0

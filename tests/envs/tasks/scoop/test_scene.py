@@ -9,7 +9,7 @@ from lerobot_excav.envs.tasks.scoop.feasibility import LEAST_MASK_PX, RADIUS_RAN
 from lerobot_excav.envs.tasks.scoop.pile import PILE_MASS_RANGE_KG
 from lerobot_excav.envs.tasks.scoop.scene import SOIL_CELL_SIZE_M, cell_centres_w, draw_scene
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M, target_mask_img
-from lerobot_excav.envs.tasks.settings import SCENE_SETS, SOILS, TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.settings import SCENE_SETS, TARGETS_PER_SCENE
 from lerobot_excav.errors import ConfigurationError
 
 SCENES = [(scene_set, scene_id) for scene_set in SCENE_SETS for scene_id in range(4)]
@@ -87,7 +87,7 @@ def test_every_target_has_a_mask_of_a_fair_number_of_pixels(soil):
     renderer.close()
 
 
-@pytest.mark.parametrize("soil", SOILS)
+@pytest.mark.parametrize("soil", PRESETS)
 def test_every_soil_preset_makes_scenes(soil):
     assert draw_scene("train", 0, soil=soil).soil == soil
 
