@@ -13,7 +13,7 @@ of every picture, `agent_pos`, reward, flags, success, task state and command; a
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 

@@ -1,6 +1,7 @@
 """Errors of the package: each names the field, the value, what is allowed and the next step."""
 
 from collections.abc import Collection
+from numbers import Integral
 from typing import Any
 
 
@@ -48,3 +49,24 @@ def require(condition: bool, message: str) -> None:  # noqa: FBT001 - reads as a
     """Raise `ConfigurationError(message)` unless the condition holds."""
     if not condition:
         raise ConfigurationError(message)
+
+
+def require_integer(field: str, value: Any, low: int, high: int | None = None, *, hint: str = "") -> None:
+    """Raise unless a value is a whole number within limits; a truth value is none.
+
+    Args:
+        field: Name of the setting as its user writes it.
+        value: The value given.
+        low: Least allowed value.
+        high: Greatest allowed value; None for no limit.
+        hint: Next step, added to the message.
+
+    Raises:
+        ConfigurationError: `value` is not a whole number from `low` to `high`.
+    """
+    is_integer = isinstance(value, Integral) and not isinstance(value, bool)
+    limits = f"from {low} on" if high is None else f"from {low} to {high}"
+    require(
+        is_integer and value >= low and (high is None or value <= high),
+        f"{field}={value!r} is not possible; give a whole number {limits}. {hint}".rstrip(),
+    )

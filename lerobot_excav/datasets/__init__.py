@@ -1,13 +1,8 @@
-"""Datasets of paired demonstrations.
+"""Datasets of paired demonstrations, by what is done with them.
 
-- `environment`: what differs between environments; `environments` lists them, `excavator_environment` and
-  `fr5_grasp_environment` describe them.
-- `schema`: what a frame holds. `storage`: how its pictures are kept. `episode_table`: reading it back, episode by
-  episode, with `pictures`.
-- `demonstrations`: recording with the scripted operator; `demonstration_settings`, `target_rule`, `rig`, `episode`,
-  `simulation`, `workers`, `episode_store`, `partial_run`, `assembly`, `progress` and `provenance` are its parts.
-- `paired_index`: one row per episode; `pair_coverage`, `selection` and `split` work on it.
-- `resimulation`: completing what `lerobot-record` recorded, from its `session` log, after `recording_check`.
-- `quality_check`: `episode_check` and `replay_check` over a dataset. `version_check`: which simulation made it.
-- `json_lines`: reading session logs and metrics files.
+- `format`: what a frame holds, how pictures are stored, and reading a dataset back episode by episode.
+- `pairs`: the paired-scene index; which episodes are chosen by it, and which are held out.
+- `record`: recording with the scripted operator, in parallel and resumable.
+- `complete`: adding to a recording of `lerobot-record` what only the simulation knows.
+- `check`: the quality check.
 """

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.format.pair import Pair
-from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.datasets.record.progress import EpisodeProgress
-from lerobot_excav.datasets.record.rig import Rig
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
@@ -16,12 +15,11 @@ from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
 def evaluate_operator(
-    settings: DemonstrationSettings,
+    settings: PlayedScenes,
     path: Path,
     *,
     workers: int = 2,
     resume: bool = False,
-    rig: Rig | None = None,
     show_progress: bool = True,
 ) -> None:
     """Let the scripted operator play scenes without pictures, and write a metrics file.
@@ -33,7 +31,6 @@ def evaluate_operator(
         path: Metrics file; its folder is made.
         workers: Worker processes; 0 works in this process.
         resume: Whether to continue an interrupted run.
-        rig: Environment and operator; those of the settings by default.
         show_progress: Whether to draw a progress bar.
 
     Raises:
@@ -53,28 +50,13 @@ def evaluate_operator(
     lines = _finished_lines(partial, settings, pairs)
     # Rewritten whole, so that a line torn by the interruption is gone.
     partial.write_text("".join(f"{line}\n" for line in lines))
-    _play_rest(
-        settings,
-        partial,
-        pairs,
-        len(lines),
-        workers,
-        rig or settings.environment.rig(with_images=False),
-        show=show_progress,
-    )
+    _play_rest(settings, partial, pairs, len(lines), workers, show=show_progress)
     partial.rename(path)
     write_provenance(path)
 
 
 def _play_rest(
-    settings: DemonstrationSettings,
-    partial: Path,
-    pairs: list[Pair],
-    first: int,
-    workers: int,
-    rig: Rig,
-    *,
-    show: bool,
+    settings: PlayedScenes, partial: Path, pairs: list[Pair], first: int, workers: int, *, show: bool
 ) -> None:
     """Play the pairs from `first` on and append their lines."""
     with (
@@ -84,41 +66,37 @@ def _play_rest(
     ):
         for _ in range(first):
             progress.skip()
-        futures = [
-            submit_episode(pool, progress, play_for_metrics, rig, settings, pair) for pair in pairs[first:]
-        ]
+        futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]
         for number, future in enumerate(futures, first):
             file.write(json_line({"episode_ix": number, **episode_result(pairs[number], future)["line"]}))
             file.flush()
 
 
-def play_for_metrics(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
+def play_for_metrics(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
     """Play one episode and return its `success` and its `line` of the metrics file; runs in a worker."""
-    episode = play_demonstration(rig, settings, pair)
+    episode = play_demonstration(settings, pair, with_images=False)
     return {"success": episode.success, "line": {**_operator(settings), **episode.metrics}}
 
 
-def _operator(settings: DemonstrationSettings) -> dict[str, Any]:
+def _operator(settings: PlayedScenes) -> dict[str, Any]:
     """Return what the environment does not know: who plays."""
     return {"operator": "scripted", "operator_seed": settings.seed}
 
 
-def _expected(settings: DemonstrationSettings, pair: Pair) -> dict[str, Any]:
+def _expected(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
     """Return the part of an episode's line that is known before it is played."""
+    env = {name: value for name, value in settings.env.as_dict().items() if value is not None}
     return {
         **_operator(settings),
-        "simulation_version": settings.environment.simulation_version,
-        "task": settings.task,
-        "scene_set": pair.scene_set,
+        "simulation_version": settings.task_spec.simulation_version,
+        **env,
         "scene_id": pair.scene_id,
         "target_id": pair.target_id,
-        **settings.extra,
-        "fps": settings.fps,
         "episode_length": settings.episode_length,
     }
 
 
-def _finished_lines(partial: Path, settings: DemonstrationSettings, pairs: list[Pair]) -> list[str]:
+def _finished_lines(partial: Path, settings: PlayedScenes, pairs: list[Pair]) -> list[str]:
     """Return the whole lines of an interrupted run, after checking that they belong to these settings."""
     if not partial.exists():
         return []

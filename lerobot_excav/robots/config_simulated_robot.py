@@ -1,17 +1,16 @@
-"""What the configurations of all simulated robots share."""
+"""What the configurations of all simulated robots share, besides the settings of their tasks."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.envs.tasks.settings import (
-    LAST_SCENE,
-    TARGETS_PER_SCENE,
-    require_integer,
-    require_view_settings,
-)
-from lerobot_excav.errors import require_choice
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.errors import require
 
 ADVANCE_MODES = ("episode", "button")
 
@@ -20,45 +19,53 @@ ADVANCE_MODES = ("episode", "button")
 class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up a simulated robot from LeRobot's command line.
 
-    Attributes:
-        task: Name of the task in the gym namespace `lerobot_excav`.
-        fps: Frames per second of simulated time, which every `send_action` advances by one frame. Give the
-            command the same: `--dataset.fps` when recording, `--fps` when rolling out.
-        observation_height: Height of every picture [px].
-        observation_width: Width of every picture [px].
-        scene_set: Stream of scenes: `train`, `val` or `test`.
-        scene_id: First scene.
-        target_id: First target in it, 0 to 3.
-        advance: What leads to the next target: `episode`, so that every recorded episode has its own, or
-            `button`, so that only the side-channel key `next_scene` does.
-        session_log: JSON Lines file about the recorded episodes (see `session_log.py`), by default
-            `outputs/<robot>_sessions/<date>_<time>.jsonl` below the working directory.
+    Put the settings of a task before this class, and register the result with LeRobot:
+
+        @RobotConfig.register_subclass("excavator_sim")
+        @dataclass(kw_only=True)
+        class ExcavatorSimConfig(ExcavatorSettings, SimulatedRobotConfig):
+            PREFIX: ClassVar[str] = "robot."
+
+    Every `send_action` advances the simulation by one frame of `fps`: give the command the same rate, as
+    `--dataset.fps` when recording and as `--fps` when rolling out.
+
+    Raises:
+        ConfigurationError: A field has a value that the simulation cannot use.
     """
 
-    task: str
-    fps: int
-    observation_height: int = 96
-    observation_width: int = 128
-    scene_set: str = "train"
-    scene_id: int = 0
-    target_id: int = 0
-    advance: str = "episode"
-    session_log: Path | None = None
+    scene_id: int = setting("First scene", default=0, low=0, high=LAST_SCENE)
+    target_id: int = setting("First target in it", default=0, choices=tuple(range(TARGETS_PER_SCENE)))
+    advance: str = setting(
+        "What leads to the next target: episode gives every recorded episode its own, button waits for the key "
+        "next_scene of the side channel",
+        default="episode",
+        choices=ADVANCE_MODES,
+    )
+    session_log: Path | None = setting(
+        "JSON Lines file about the recorded episodes, for lerobot-excav index; left out: "
+        "outputs/<robot>_sessions/<date>_<time>.jsonl",
+        default=None,
+    )
+    depth: bool = setting(
+        "Whether the robot offers the depth image registered with the main camera, to Python code",
+        default=False,
+    )
 
     def __post_init__(self) -> None:
-        """Validate the fields; the subclass validates its task.
+        super().__post_init__()
+        length = cast(TaskSettings, self).episode_length
+        require(
+            length is None,
+            f"robot.episode_length={length} has no effect: the command ends an episode. Leave it out; lerobot-record "
+            "takes --dataset.episode_time_s.",
+        )
+        _ = self.task_spec  # a robot without such a task is refused at once
+
+    @property
+    def task_spec(self) -> TaskSpec:
+        """The task.
 
         Raises:
-            ConfigurationError: A field has a value that the simulation cannot use.
+            ConfigurationError: This robot has no such task.
         """
-        super().__post_init__()
-        require_view_settings(
-            "robot.",
-            scene_set=self.scene_set,
-            fps=self.fps,
-            observation_height=self.observation_height,
-            observation_width=self.observation_width,
-        )
-        require_integer("robot.scene_id", self.scene_id, 0, LAST_SCENE)
-        require_choice("robot.target_id", self.target_id, range(TARGETS_PER_SCENE))
-        require_choice("robot.advance", self.advance, ADVANCE_MODES)
+        return task_of_settings(cast(TaskSettings, self))

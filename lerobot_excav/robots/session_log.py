@@ -3,14 +3,13 @@
 `lerobot-record` stores pictures, state and action only. The log adds what a deterministic re-simulation
 needs (`lerobot-excav index` does it): one JSON object per recorded episode,
 
-    {"episode_index": 3, "simulation_version": 2, "scene_set": "train", "scene_id": 0, "target_id": 3,
-     "fps": 10, "soil": "sand", "fidelity": "standard", "observation_height": 96, "observation_width": 128,
-     "task": "Scoop-v0", "frames": 120, "restarts": []}
+    {"episode_index": 3, "simulation_version": 2, "env": "excavator", "scene_id": 0, "commands": [[0, 3]],
+     "settings": {"task": "Scoop-v0", "fps": 10, "soil": "sand", ...}, "frames": 120, "restarts": []}
 
-`soil` and `fidelity` are the excavator's; the lines of other machines name their environment as `env` instead.
-`episode_index` is the episode's number in the dataset when it was recorded, `frames` how many actions were
-carried out, and `restarts` after which of them somebody restarted or changed the scene within the episode;
-an episode with restarts is no single demonstration and cannot be re-simulated from its start.
+`episode_index` is the episode's number in the dataset when it was recorded, `commands` after how many actions which
+target was commanded, `settings` what the simulation was set to, `frames` how many actions were carried out, and
+`restarts` after which of them somebody restarted or changed the scene within the episode; an episode with restarts is
+not a single demonstration and cannot be re-simulated from its start.
 
 A line is written when its episode has ended and is not being re-recorded. Where two lines have one
 `episode_index`, the later holds: an interrupted recording that was resumed records that number again. For
@@ -22,6 +21,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DeviceError
 
 
@@ -40,12 +41,17 @@ class SessionLog:
 
     Args:
         path: File to append to; it is made, with its folder, when the first episode has ended.
-        common: Entries that every episode shares.
+        spec: The task.
+        settings: What the simulation is set to.
     """
 
-    def __init__(self, path: Path, common: dict[str, Any]) -> None:
+    def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings) -> None:
         self.path = path
-        self._common = common
+        self._common = {
+            "simulation_version": spec.simulation_version,
+            "env": spec.env_type,
+            "settings": settings.as_dict(),
+        }
         self._episode: dict[str, Any] | None = None
         self._is_running = False
 
@@ -55,18 +61,26 @@ class SessionLog:
             self.write()
         self._episode = {
             "episode_index": episode_index,
-            "scene_id": scene_id,
-            "target_id": target_id,
             **self._common,
+            "scene_id": scene_id,
+            "commands": [[0, target_id]],
             "frames": 0,
             "restarts": [],
         }
         self._is_running = True
 
-    def count_frame(self) -> None:
-        """Count an action of the episode; between episodes, count nothing."""
-        if self._is_running and self._episode is not None:
-            self._episode["frames"] += 1
+    def count_frame(self, target_id: int | None) -> None:
+        """Count an action of the episode; between episodes, count nothing.
+
+        Args:
+            target_id: Target that is commanded after it; None if the simulation does not say.
+        """
+        if not self._is_running or self._episode is None:
+            return
+        self._episode["frames"] += 1
+        commands = self._episode["commands"]
+        if target_id is not None and target_id != commands[-1][1]:
+            commands.append([self._episode["frames"], target_id])
 
     def note_restart(self) -> None:
         """Note that the scene was restarted or changed within the episode, if one is running."""

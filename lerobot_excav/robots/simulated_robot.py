@@ -11,16 +11,18 @@ robot disconnects.
 """
 
 import logging
-from abc import abstractmethod
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Any, ClassVar, Protocol, override
+from typing import Any, override
 
 import numpy as np
 from lerobot.robots import Robot
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
+from lerobot_excav.envs.masks.source import MaskMissingError
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.registry import task_settings
+from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
@@ -31,58 +33,34 @@ from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_press
 logger = logging.getLogger(__name__)
 
 
-class SimulatedEnvironment(Protocol):
-    """What a robot needs of the environment behind it."""
-
-    def reset(self, *, options: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start the scene and target that the options name."""
-
-    def step(self, action: NDArray[np.float32]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Advance by one frame."""
-
-    def close(self) -> None:
-        """Free the simulation."""
-
-
-class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  # LeRobot's are untyped here
-    """A machine in a simulated scene with one commanded target.
+class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """A machine in a simulated scene with a commanded target; a subclass names it and its configuration.
 
     Besides its commands an action may hold `reinitialise` or `next_scene`; a value above 0.5 restarts the
-    scene or moves on instead of advancing the simulation.
+    scene or moves on instead of advancing the simulation. An action with positions only, such as `lerobot-rollout`
+    sends between episodes to drive a robot home, restarts the scene once if the machine takes no positions.
 
     Attributes:
-        state_names: Names of the entries of `agent_pos`.
-        action_names: Names of the entries of the environment's action.
-        camera_names: Names of the pictures.
-        action_low: Least value of each command, (actions,) or one for all.
-        action_high: Greatest value of each command, (actions,) or one for all.
-        simulation_version: Version of the simulation, for session logs.
-        session_folder: Where session logs are put by default, below `outputs`.
+        task_spec: Names, units and limits of the task.
         cameras: The cameras by name, with the shape (H, W, 3) of their pictures.
         episode_count: Number of resets so far; changes exactly when an episode starts.
     """
 
-    state_names: ClassVar[tuple[str, ...]]
-    action_names: ClassVar[tuple[str, ...]]
-    camera_names: ClassVar[tuple[str, ...]]
-    action_low: ClassVar[float | NDArray[np.float64]]
-    action_high: ClassVar[float | NDArray[np.float64]]
-    simulation_version: ClassVar[int]
-    session_folder: ClassVar[str]
-
     def __init__(self, config: SimulatedRobotConfig) -> None:
         super().__init__(config)
-        self.config = config
-        shape = (config.observation_height, config.observation_width, 3)
-        self.cameras = dict.fromkeys(self.camera_names, shape)
+        self.config: Any = config
+        self.task_spec = spec = config.task_spec
+        self.settings = task_settings(self.config)
+        self.cameras = dict.fromkeys(spec.cameras, (*self.settings.observation_size, 3))
         self.episode_count = 0
-        self._env: Env | None = None
+        self._env: MaskedTaskEnv[Any, Any] | None = None
         self._observation: dict[str, Any] = {}
-        self._first = config.scene_id * TARGETS_PER_SCENE + config.target_id
+        self._first = config.scene_id * spec.target_count + config.target_id
         self._skipped = 0
         self._number = self._first  # counts targets over all scenes
-        log_path = config.session_log or default_path(self.session_folder, datetime.now())
-        self._log = SessionLog(log_path, {**self._describe_session(), **self.describe_simulation()})
+        self._is_homing = False
+        log_path = config.session_log or default_path(f"{self.name}_sessions", datetime.now())
+        self._log = SessionLog(log_path, spec, self.settings)
         self._phases = RecordingPhases(
             on_episode=self._begin_episode,
             on_pause=self._log.pause,
@@ -90,26 +68,22 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
             on_stop=self._log.write,
         )
 
-    @abstractmethod
-    def make_env(self) -> Env:
+    def make_env(self) -> MaskedTaskEnv[Any, Any]:
         """Make the environment that the configuration describes, without an end to its episodes."""
-
-    @abstractmethod
-    def describe_simulation(self) -> dict[str, Any]:
-        """Return what a session line needs to name the environment, besides what all robots share."""
+        return self.task_spec.make_env(**{**self.settings.as_dict(), "episode_length": ENDLESS_FRAMES})
 
     @property
     def observation_features(self) -> dict[str, type | tuple[int, int, int]]:
         """Scalars in the order of `agent_pos`, and the cameras."""
-        return {**dict.fromkeys(self.state_names, float), **self.cameras}
+        return {**dict.fromkeys(self.task_spec.state_names, float), **self.cameras}
 
     @property
     def action_features(self) -> dict[str, type]:
         """Commands in the order of the environment's action."""
-        return dict.fromkeys(self.action_names, float)
+        return dict.fromkeys(self.task_spec.action_names, float)
 
     @property
-    def env(self) -> Env:
+    def env(self) -> MaskedTaskEnv[Any, Any]:
         """The environment behind the robot.
 
         Raises:
@@ -122,12 +96,12 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
     @property
     def scene_id(self) -> int:
         """Current scene."""
-        return self._number // TARGETS_PER_SCENE
+        return self._number // self.task_spec.target_count
 
     @property
     def target_id(self) -> int:
         """Current target of the scene."""
-        return self._number % TARGETS_PER_SCENE
+        return self._number % self.task_spec.target_count
 
     @property
     def is_connected(self) -> bool:
@@ -183,8 +157,8 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
         state = self._observation["agent_pos"].tolist()
         pixels = self._observation["pixels"]
         return {
-            **dict(zip(self.state_names, state, strict=True)),
-            **{camera: pixels[camera].copy() for camera in self.camera_names},
+            **dict(zip(self.task_spec.state_names, state, strict=True)),
+            **{camera: pixels[camera].copy() for camera in self.cameras},
         }
 
     def send_action(self, action: Mapping[str, Any]) -> dict[str, Any]:
@@ -199,7 +173,12 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
         Raises:
             DeviceError: The robot is not connected, a command is missing or not finite.
         """
-        env = self.env
+        env, names = self.env, self.task_spec.action_names
+        if self._drives_home(action):
+            if not self._is_homing:
+                self.restart_scene()
+            self._is_homing = True
+            return dict(action)
         if is_pressed(action, NEXT_SCENE):
             self._number += 1
             self._skipped += 1
@@ -208,11 +187,26 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
         if is_pressed(action, REINITIALISE):
             self.restart_scene()
             return dict(action)
-        command = np.clip(command_from_action(action, self.action_names), self.action_low, self.action_high)
-        command = command.astype(np.float32)
-        self._observation = env.step(command)[0]
-        self._log.count_frame()
-        return dict(zip(self.action_names, command.tolist(), strict=True))
+        limits = self.task_spec.action_low, self.task_spec.action_high
+        command = np.clip(command_from_action(action, names), *limits).astype(np.float32)
+        self._observation, *_, info = env.step(command)
+        self._is_homing = False
+        self._log.count_frame(info.get("target_id"))
+        self._require_mask(info)
+        return dict(zip(names, command.tolist(), strict=True))
+
+    def depth_m(self) -> NDArray[np.float32]:
+        """Return the depth image registered with the main camera.
+
+        Returns:
+            Distance along the optical axis [m], shape (H, W), float32.
+
+        Raises:
+            DeviceError: The robot is not connected, or was set up without depth.
+        """
+        if not self.config.depth:
+            raise DeviceError("this robot offers no depth image; set --robot.depth=true.")
+        return self.env.depth_m()
 
     def restart_scene(self) -> None:
         """Start the current scene again; within a recorded episode the session log notes it."""
@@ -222,9 +216,11 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
     def start_scene(self) -> None:
         """Reset the environment to the current scene and target."""
         options = {"scene_id": self.scene_id, "target_id": self.target_id}
-        self._observation, _ = self.env.reset(options=options)
+        self._observation, info = self.env.reset(options=options)
+        self._is_homing = False
+        self._require_mask(info)
         self.episode_count += 1
-        logger.info("Scene %d, target %d of set %s", self.scene_id, self.target_id, self.config.scene_set)
+        logger.info("Scene %d, target %d of set %s", self.scene_id, self.target_id, self.settings.scene_set)
 
     def _begin_episode(self, episode_index: int) -> None:
         if self.config.advance == "episode":
@@ -232,15 +228,18 @@ class SimulatedRobot[Env: SimulatedEnvironment](Robot):  # type: ignore[misc]  #
         self.start_scene()
         self._log.begin(episode_index, scene_id=self.scene_id, target_id=self.target_id)
 
-    def _describe_session(self) -> dict[str, Any]:
-        return {
-            "simulation_version": self.simulation_version,
-            "scene_set": self.config.scene_set,
-            "fps": self.config.fps,
-            "observation_height": self.config.observation_height,
-            "observation_width": self.config.observation_width,
-            "task": self.config.task,
-        }
+    def _drives_home(self, action: Mapping[str, Any]) -> bool:
+        """Tell whether an action holds positions only, and the machine takes none."""
+        takes_positions = any(name.endswith(".pos") for name in self.task_spec.action_names)
+        return bool(action) and not takes_positions and all(name.endswith(".pos") for name in action)
+
+    def _require_mask(self, info: Mapping[str, Any]) -> None:
+        if info.get("mask_missing"):
+            raise MaskMissingError(
+                f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of scene "
+                f"{self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
+                "with another --robot.scene_id or --robot.target_id, choose larger pictures or another source."
+            )
 
 
 def command_from_action(action: Mapping[str, Any], names: tuple[str, ...]) -> NDArray[np.float32]:

@@ -1,53 +1,84 @@
 """Record demonstrations with the scripted operator as a LeRobot dataset.
 
 Episodes are simulated in parallel and assembled in order; OUT appears only when it is complete. After an interruption
-the same command with --resume goes on; the dataset becomes the same as without it. Episodes without success are left
-out and listed, unless --keep-failures.
+the same command with --resume=true goes on; the dataset becomes the same as without it. Episodes without success are
+left out and listed, unless --keep_failures=true.
 
 Examples:
-  lerobot-excav demos --env=excavator --scenes=50 --targets=4 --out=outputs/paired
+  lerobot-excav demos --env.type=excavator --scenes=50 --targets=4 --out=outputs/paired
       50 scenes, each with its 4 targets: 200 paired episodes
-  lerobot-excav demos --scenes=200 --targets=1 --out=outputs/non_paired
-      as many episodes, each of another scene
-  lerobot-excav demos --env=fr5_grasp --scenes=200 --targets=1 --target-rule=nearest --out=outputs/nearest
+  lerobot-excav demos --env.type=excavator --env.soil=gravel --scenes=200 --targets=1 --out=outputs/non_paired
+      as many episodes, each of another scene, on another soil
+  lerobot-excav demos --env.type=fr5_grasp --scenes=200 --targets=1 --target_rule=nearest --out=outputs/nearest
       the arm, sent to the block nearest to it in each of 200 scenes
-  lerobot-excav demos --scenes=50 --out=outputs/paired --resume
+  lerobot-excav demos --env.type=excavator --scenes=50 --out=outputs/paired --resume=true
       go on after an interruption
 """
 
-import argparse
+import dataclasses
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
-from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.scripts.demonstration_arguments import add_settings, add_storage, settings_from
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
+from lerobot_excav.envs.tasks.registry import task_settings
+from lerobot_excav.envs.tasks.setting import declared_settings, setting
+from lerobot_excav.errors import require
+from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    default = DemonstrationSettings()
-    parser.add_argument("--out", type=Path, required=True, help="folder of the dataset; must not exist")
-    parser.add_argument("--resume", action="store_true", help="continue an interrupted run, or start one")
-    parser.add_argument(
-        "--keep-failures", action="store_true", help="keep episodes without success, marked as such"
+@dataclass(kw_only=True)
+class WorkArguments(Arguments):
+    """How work is spread."""
+
+    workers: int = setting(
+        "Processes that simulate; the result does not depend on it, and 0 works in this process",
+        default=2,
+        low=0,
     )
-    parser.add_argument(
-        "--height", type=int, default=default.height, help=f"image height (default: {default.height})"
-    )
-    parser.add_argument(
-        "--width", type=int, default=default.width, help=f"image width (default: {default.width})"
-    )
-    add_storage(parser)
-    add_settings(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
+@dataclass(kw_only=True)
+class ResumableArguments(WorkArguments):
+    """Work that can be continued."""
+
+    resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
+
+
+def default_environment(**settings: Any) -> Any:
+    """Return the first environment, with some settings that differ from its own defaults."""
+    return EnvironmentChoice.get_choice_class(EnvironmentChoice.default_choice_name())(**settings)
+
+
+@dataclass(kw_only=True)
+class DemosArguments(ResumableArguments, DemonstrationSettings):
+    """Arguments of `lerobot-excav demos`."""
+
+    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
+        default_factory=default_environment
+    )
+    """Environment, with its settings; the excavator by default."""
+    out: Path | None = setting("Folder of the dataset; must not exist", default=None)
+
+
+def played[Played: PlayedScenes](kind: type[Played], arguments: PlayedScenes) -> Played:
+    """Return what is played, apart from the other arguments of a command."""
+    values = {name: getattr(arguments, name) for name in declared_settings(kind)}
+    return kind(env=task_settings(arguments.env), **values)
+
+
+def run(arguments: DemosArguments) -> int:
     """Record, and say what was recorded."""
+    require(
+        arguments.out is not None,
+        "--out is missing; give the folder of the dataset, such as --out=outputs/paired",
+    )
     # Slow to import (LeRobot, PyTorch), so after the arguments are known to be right.
-    from lerobot_excav.datasets.record.demonstrations import DemonstrationSummary, record_demonstrations
+    from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 
-    settings = settings_from(arguments)
-    summary: DemonstrationSummary = record_demonstrations(
-        settings, arguments.out, workers=arguments.workers, resume=arguments.resume
+    settings = played(DemonstrationSettings, arguments)
+    summary = record_demonstrations(
+        settings, cast(Path, arguments.out), workers=arguments.workers, resume=arguments.resume
     )
     print(f"{summary.out}: {summary.episodes} episodes of {settings.scenes} scenes")
     if summary.failures:
@@ -59,3 +90,6 @@ def run(arguments: argparse.Namespace) -> int:
     )
     print(f"next: lerobot-excav qc {summary.out}")
     return 0
+
+
+ARGUMENTS = DemosArguments

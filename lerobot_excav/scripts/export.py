@@ -11,34 +11,57 @@ Examples:
       ... with a title, a command to run it, and results in the card
 """
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar, cast
+
+from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.scripts.arguments import Arguments
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("checkpoint", type=Path, help="pretrained_model folder of a run of lerobot-train")
-    parser.add_argument("--out", type=Path, required=True, help="folder to write")
-    parser.add_argument("--title", default="mask_act", help="heading of the card (default: mask_act)")
-    parser.add_argument(
-        "--env",
-        default="excavator",
-        help="environment in the card's command, as in --env.type (default: excavator)",
-    )
-    parser.add_argument("--results", type=Path, help="Markdown file for the card's section Evaluation")
-    parser.add_argument("--license", default="apache-2.0", help="licence in the card (default: apache-2.0)")
+@dataclass(kw_only=True)
+class ExportArguments(Arguments):
+    """Arguments of `lerobot-excav export`."""
+
+    POSITIONAL: ClassVar[str] = "checkpoint"
+
+    checkpoint: Path | None = setting("pretrained_model folder of a run of lerobot-train", default=None)
+    out: Path | None = setting("Folder to write", default=None)
+    title: str = setting("Heading of the card", default="mask_act")
+    env: str = setting("Environment in the card's command, as in --env.type", default="excavator")
+    results: Path | None = setting("Markdown file for the card's section Evaluation", default=None)
+    license: str = setting("Licence in the card, as the Hugging Face Hub spells it", default="apache-2.0")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Export, and print what was written."""
+def run(arguments: ExportArguments) -> int:
+    """Export, and print what was written.
+
+    Raises:
+        ConfigurationError: The checkpoint is not given, or cannot be exported.
+    """
     from lerobot_excav.policies.mask_act.export import export_checkpoint
     from lerobot_excav.policies.mask_act.model_card import CardFacts
 
-    results = arguments.results.read_text() if arguments.results is not None else ""
-    facts = CardFacts(
-        title=arguments.title, env_type=arguments.env, results=results, license=arguments.license
+    if arguments.checkpoint is None:
+        raise ConfigurationError(
+            "checkpoint is missing; give the pretrained_model folder of a run of lerobot-train, for example "
+            "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging"
+        )
+    require(
+        arguments.out is not None,
+        "--out is missing; give the folder to write, such as --out=checkpoints/digging",
     )
-    out = export_checkpoint(arguments.checkpoint, arguments.out, facts)
+    facts = CardFacts(
+        title=arguments.title,
+        env_type=arguments.env,
+        results=arguments.results.read_text() if arguments.results is not None else "",
+        license=arguments.license,
+    )
+    out = export_checkpoint(arguments.checkpoint, cast(Path, arguments.out), facts)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0
+
+
+ARGUMENTS = ExportArguments

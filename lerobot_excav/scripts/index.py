@@ -6,63 +6,65 @@ every edit. With --select and --split it prints the flags that make stock lerobo
 Examples:
   lerobot-excav index outputs/paired
       rebuild; list scenes with missing or duplicate targets
-  lerobot-excav index outputs/recorded --session=outputs/excavator_sessions/2026-01-31_10-00-00.jsonl
+  lerobot-excav index outputs/recorded --session=outputs/excavator_sim_sessions/2026-01-31_10-00-00.jsonl
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
-  lerobot-excav index outputs/paired --split=scene --eval-fraction=0.2
+  lerobot-excav index outputs/paired --split=scene --eval_fraction=0.2
       hold out a fifth of the scenes, with all their episodes
   lerobot-train ... --eval_steps=500 \
-      $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags)
+      $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags=true)
       train on one episode of each of 40 scenes
 """
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
 from lerobot_excav.datasets.check.version_check import episodes_by_version, require_one_version, versions_of
-from lerobot_excav.datasets.pairs.pair_coverage import START_SETTINGS, PairCoverage, pair_coverage
+from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split
-from lerobot_excav.datasets.record.environments import ENVIRONMENTS
+from lerobot_excav.envs.tasks.registry import env_types
+from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
+from lerobot_excav.scripts.qc import DatasetArguments
 
 DEFAULT_EVAL_FRACTION = 0.2
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("dataset", type=Path, help="folder of the dataset")
-    parser.add_argument(
-        "--session", type=Path, help="session log of the simulated robot: add the excav.* columns first"
+@dataclass(kw_only=True)
+class IndexArguments(DatasetArguments):
+    """Arguments of `lerobot-excav index`."""
+
+    session: Path | None = setting(
+        "Session log of the simulated robot: add the excav.* columns first", default=None
     )
-    parser.add_argument(
-        "--out", type=Path, help="with --session: put the completed dataset here, keep the recording"
+    out: Path | None = setting(
+        "With a session: put the completed dataset here, and keep the recording", default=None
     )
-    parser.add_argument(
-        "--skip-restarted",
-        action="store_true",
-        help="with --session: leave out episodes in which the scene was restarted",
+    skip_restarted: bool = setting(
+        "With a session: leave out episodes in which the scene was restarted", default=False
     )
-    group = parser.add_argument_group("choosing episodes for lerobot-train")
-    group.add_argument("--select", choices=COMPOSITIONS, default="all", help="composition (default: all)")
-    group.add_argument("--episodes", type=int, help="how many episodes (default: as many as there are)")
-    group.add_argument("--scenes", type=int, help="how many scenes, for paired and non-paired")
-    group.add_argument("--include-failures", action="store_true", help="also choose episodes without success")
-    group.add_argument("--split", choices=SPLIT_UNITS, help="hold out whole scenes, or single episodes")
-    group.add_argument(
-        "--eval-fraction", type=float, help=f"part to hold out (default: {DEFAULT_EVAL_FRACTION})"
+    select: str = setting("Composition of the episodes to train on", default="all", choices=COMPOSITIONS)
+    episodes: int | None = setting("How many episodes; left out: as many as there are", default=None, low=1)
+    scenes: int | None = setting("How many scenes, for paired and non-paired", default=None, low=1)
+    include_failures: bool = setting("Whether to choose episodes without success as well", default=False)
+    split: str | None = setting(
+        "Hold out whole scenes, or single episodes", default=None, choices=SPLIT_UNITS
     )
-    group.add_argument("--seed", type=int, help="seed of choice and split (default: 0)")
-    group.add_argument("--flags", action="store_true", help="print nothing but the flags, for $(...)")
+    eval_fraction: float | None = setting(
+        f"Part to hold out; left out: {DEFAULT_EVAL_FRACTION}", default=None, low=0.0, high=1.0
+    )
+    seed: int | None = setting("Seed of choice and split; left out: 0", default=None, low=0)
+    flags: bool = setting("Whether to print nothing but the flags, for $(...)", default=False)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: IndexArguments) -> int:
     """Complete, rebuild, choose, and say what came of it."""
     from lerobot_excav.datasets.pairs.paired_index import INDEX_PATH, write_index
 
     _require_options_with_effect(arguments)
-    root = arguments.dataset
+    root = arguments.root
     if arguments.session is not None:
         from lerobot_excav.datasets.complete.resimulation import complete_recording
 
@@ -78,15 +80,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _require_options_with_effect(arguments: argparse.Namespace) -> None:
+def _require_options_with_effect(arguments: IndexArguments) -> None:
     for option, given in (
         ("--out", arguments.out is not None),
-        ("--skip-restarted", arguments.skip_restarted),
+        ("--skip_restarted", arguments.skip_restarted),
     ):
         require(not given or arguments.session is not None, f"{option} is of use with --session only")
     require(
         arguments.eval_fraction is None or arguments.split is not None,
-        f"--eval-fraction={arguments.eval_fraction} has no effect without --split; add --split=scene",
+        f"--eval_fraction={arguments.eval_fraction} has no effect without --split; add --split=scene",
     )
     chooses = arguments.select != "all" or arguments.episodes is not None or arguments.split is not None
     require(
@@ -95,7 +97,7 @@ def _require_options_with_effect(arguments: argparse.Namespace) -> None:
     )
 
 
-def _asks_for_episodes(arguments: argparse.Namespace) -> bool:
+def _asks_for_episodes(arguments: IndexArguments) -> bool:
     counts = arguments.episodes is not None or arguments.scenes is not None
     asked = arguments.flags or arguments.split or arguments.include_failures
     return bool(counts or asked or arguments.select != "all")
@@ -107,10 +109,10 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
     lines = [
         "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in sorted(versions.items())),
-        *(_counts(name, index[name]) for name in START_SETTINGS if name in index),
+        *(_counts(name, index[name]) for name in start_settings(index)),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
-        ENVIRONMENTS[index["env"].iloc[0]].summary(index),
+        env_types()[index["env"].iloc[0]].measures.summary(index),
     ]
     if len(versions) > 1:
         lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")
@@ -125,7 +127,7 @@ def _counts(name: str, column: pd.Series) -> str:
     return f"{name}: {'; '.join(parts)}"
 
 
-def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame) -> None:
+def _print_flags(arguments: IndexArguments, root: Path, index: pd.DataFrame) -> None:
     require_one_version(versions_of(index), source=root)
     seed = arguments.seed or 0
     rows = usable(index, include_failures=arguments.include_failures)
@@ -148,3 +150,6 @@ def _print_flags(arguments: argparse.Namespace, root: Path, index: pd.DataFrame)
             ["lerobot-train ...", f"--dataset.root={root}", *(f"'{flag}'" for flag in parts.flags())]
         )
     )
+
+
+ARGUMENTS = IndexArguments

@@ -4,7 +4,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
-from types import ModuleType
+from importlib.metadata import version
 
 from lerobot_excav.errors import ExcavError
 
@@ -12,15 +12,15 @@ COMMANDS = {
     "demos": "record demonstrations with the scripted operator, faster than real time",
     "index": "rebuild the paired-scene index, complete a recording, print lerobot-train's episode flags",
     "qc": "check a dataset and replay a sample of its episodes",
+    "operator": "let the scripted operator play scenes, for the efficiency in reports",
     "report": "make the table of one or more evaluations, with intervals and comparisons",
     "export": "write a small copy of a trained policy, with a model card",
-    "experiment": "run the stages of an experiment that are not finished",
-    "bench": "measure this machine or the scripted operator; put the soil to the test",
+    "bench": "measure how fast this machine simulates and records",
 }
 
 EPILOG = """\
 a first round:
-  lerobot-excav demos --scenes=50 --targets=4 --out=outputs/digging
+  lerobot-excav demos --env.type=excavator --scenes=50 --targets=4 --out=outputs/digging
   lerobot-excav qc outputs/digging
   lerobot-train --policy.type=mask_act --policy.preset=fast --policy.target_token=true \\
       --policy.chunk_size=10 --policy.actions_per_token=1 --policy.push_to_hub=false \\
@@ -45,14 +45,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit code: 0, 1 if a check failed, 2 after an error of usage or data, 130 after Ctrl-C.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments[:1] == ["--version"]:
+        print(f"lerobot-excav {version('lerobot_env_excav')}")
+        return 0
     if not arguments or arguments[0] not in COMMANDS:
         _overview().parse_args(arguments or ["--help"])
         return 0
     name, *rest = arguments
     # Loaded only now, so that help is instant whatever the other commands need.
+    from lerobot_excav.envs.tasks.registry import load_plugins
+    from lerobot_excav.scripts.arguments import parse_arguments
+
     command = importlib.import_module(f"lerobot_excav.scripts.{name}")
     try:
-        return int(command.run(command_parser(name, command).parse_args(rest)))
+        load_plugins()
+        parsed = parse_arguments(command.ARGUMENTS, rest, command=name, description=command.__doc__ or "")
+        return int(command.run(parsed))
     except ExcavError as error:
         print(f"lerobot-excav {name}: {error}", file=sys.stderr)
         return 2
@@ -64,22 +72,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"\nlerobot-excav {name}: interrupted", file=sys.stderr)
         return 130
-
-
-def command_parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
-    """Build the argument parser of a subcommand.
-
-    Args:
-        name: Its name.
-        command: Its module, with `add_arguments` and a docstring that ends in examples.
-    """
-    parser = argparse.ArgumentParser(
-        prog=f"lerobot-excav {name}",
-        description=command.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_arguments(parser)
-    return parser
 
 
 def _overview() -> argparse.ArgumentParser:

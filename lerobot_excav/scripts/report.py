@@ -21,32 +21,32 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
+from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report
 from lerobot_excav.evaluation.report_text import report_text
 from lerobot_excav.evaluation.run import Run
+from lerobot_excav.scripts.arguments import Arguments
 
 
-def _help(text: str) -> dict[str, dict[str, str]]:
-    return {"custom_args": {"help": text}}
+@dataclass(kw_only=True)
+class ReportArguments(Arguments):
+    """Arguments of `lerobot-excav report`."""
 
+    POSITIONAL: ClassVar[str] = "metrics"
 
-@dataclass
-class ReportArguments:
-    """Options of `lerobot-excav report`."""
-
-    metrics: list[str] = field(default_factory=list, metadata=_help("[LABEL=]FILE or folder, any number"))
-    rows: Path | None = field(default=None, metadata=_help("TOML file of a page, in place of METRICS"))
-    metrics_folder: Path | None = field(
-        default=None, metadata=_help("with --rows: folder of the metrics in place of the file's")
+    metrics: list[str] = field(default_factory=list)
+    """[LABEL=]FILE or folder, any number"""
+    rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
+    metrics_folder: Path | None = setting(
+        "With --rows: folder of the metrics in place of the file's", default=None
     )
-    operator: Path | None = field(
-        default=None, metadata=_help("metrics file of an operator on the same scenes")
-    )
-    out: Path | None = field(default=None, metadata=_help("folder for report.md and report.json"))
-    seed: int = field(default=0, metadata=_help("seed of the bootstrap"))
+    operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
+    out: Path | None = setting("Folder for report.md and report.json", default=None)
+    seed: int = setting("Seed of the bootstrap", default=0, low=0)
 
 
 def run(arguments: ReportArguments) -> int:
@@ -137,3 +137,6 @@ def _label_and_path(result: str) -> tuple[str, Path]:
 
 def _default_label(path: Path) -> str:
     return path.resolve().parent.name if path.stem == "metrics" else path.stem
+
+
+ARGUMENTS = ReportArguments

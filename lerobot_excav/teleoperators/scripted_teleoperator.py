@@ -4,30 +4,20 @@ It looks into the simulation of the connected robot, so it works with one type o
 demonstrations are wanted faster than in real time, use `lerobot-excav demos`.
 """
 
-from abc import abstractmethod
-from typing import Any, ClassVar, Protocol, override
+from typing import ClassVar, override
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.tasks.registry import task_of_robot
+from lerobot_excav.envs.tasks.task import Operator
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.teleoperators.config_scripted_teleoperator import ScriptedTeleoperatorConfig
 from lerobot_excav.teleoperators.simulation_teleoperator import SimulationTeleoperator
 
 
-class Script(Protocol):
-    """What a teleoperator needs of the operator behind it."""
-
-    def reset(self, env: Any) -> None:
-        """Plan anew for the state of an environment."""
-
-    def act(self, env: Any) -> NDArray[Any]:
-        """Return the next action."""
-
-
-class ScriptedTeleoperator[Operator: Script](SimulationTeleoperator):
-    """Do the robot's task by a script, which starts over by itself whenever the robot's scene has been reset.
+class ScriptedTeleoperator(SimulationTeleoperator):
+    """Do the robot's task by its script, which starts over by itself whenever the robot's scene has been reset.
 
     Attributes:
         robot_type: The type of robot that it drives, as in `--robot.type`.
@@ -42,13 +32,10 @@ class ScriptedTeleoperator[Operator: Script](SimulationTeleoperator):
         self._operator: Operator | None = None
         self._episode: tuple[int, int] | None = None
 
-    @abstractmethod
-    def make_operator(self, rng: np.random.Generator) -> Operator:
-        """Make the operator of one episode."""
-
-    def command(self, operator: Operator, env: Any) -> NDArray[Any]:
-        """Return the operator's next command, (actions,)."""
-        return operator.act(env)
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the commands."""
+        return task_of_robot(self.robot_type).action_names
 
     @property
     def is_connected(self) -> bool:
@@ -72,11 +59,12 @@ class ScriptedTeleoperator[Operator: Script](SimulationTeleoperator):
         episode = (id(robot), robot.episode_count)
         if self._operator is None or episode != self._episode:
             seed = (self.config.seed, robot.scene_id, robot.target_id)
-            self._operator = self.make_operator(np.random.default_rng(seed))
+            self._operator = robot.task_spec.make_operator(np.random.default_rng(seed))
             self._operator.reset(robot.env)
             self._episode = episode
-        command = np.clip(self.command(self._operator, robot.env), robot.action_low, robot.action_high)
-        return dict(zip(self.action_names, command.tolist(), strict=True))
+        limits = robot.task_spec.action_low, robot.task_spec.action_high
+        command = np.clip(self._operator.act(robot.env), *limits)
+        return dict(zip(robot.task_spec.action_names, command.tolist(), strict=True))
 
     def disconnect(self) -> None:
         """Let go of the robot's simulation."""

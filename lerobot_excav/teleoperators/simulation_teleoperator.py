@@ -1,18 +1,18 @@
 """What everything that drives a simulated machine shares as a LeRobot teleoperator."""
 
-from typing import Any, ClassVar
+from abc import abstractmethod
+from typing import Any
 
 from lerobot.teleoperators.teleoperator import Teleoperator
 
 
 class SimulationTeleoperator(Teleoperator):  # type: ignore[misc]  # LeRobot's classes are untyped here
-    """A teleoperator that gives a machine's commands, gets no feedback and needs no calibration.
+    """A teleoperator that gives a machine's commands, gets no feedback and needs no calibration."""
 
-    Attributes:
-        action_names: Names of the commands, as the robot takes them.
-    """
-
-    action_names: ClassVar[tuple[str, ...]]
+    @property
+    @abstractmethod
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the commands, as the robot takes them."""
 
     @property
     def action_features(self) -> dict[str, type]:

@@ -52,7 +52,7 @@ def grasp(number, **changes):
         "task": "FR5Grasp-v0",
         "episode_return": 800.0,
         "first_grasped_block": number % 4,
-        "shown_block": number % 4,
+        "shown_target_id": number % 4,
         "target_in_tray": True,
         "blocks_in_tray": 1,
         "released": True,

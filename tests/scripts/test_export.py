@@ -1,42 +1,36 @@
+from pathlib import Path
+
 import pytest
 
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act import export
 from lerobot_excav.policies.mask_act.model_card import CardFacts
-from lerobot_excav.scripts.main import main
+from lerobot_excav.scripts.export import ExportArguments, run
 
 
-@pytest.fixture
-def asked(monkeypatch):
-    """What the command asks of the export, which writes one file of a megabyte instead."""
-    calls = []
+def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp_path, capsys):
+    asked = []
 
     def write(checkpoint, out, facts):
-        calls.append((checkpoint, out, facts))
+        asked.append((checkpoint, facts))
         out.mkdir()
         (out / "model.safetensors").write_bytes(bytes(1_000_000))
         return out
 
     monkeypatch.setattr(export, "export_checkpoint", write)
-    return calls
-
-
-def test_the_folder_is_written_and_its_size_told(asked, tmp_path, capsys):
-    assert main(["export", "checkpoint", f"--out={tmp_path / 'small'}"]) == 0
-    text = capsys.readouterr().out
-    assert "1.0 MB" in text
-    assert f"--policy.path={tmp_path / 'small'}" in text
-    assert asked[0][2] == CardFacts()
-
-
-def test_the_options_are_facts_of_the_card(asked, tmp_path):
     (tmp_path / "table.md").write_text("98 of 100")
-    options = [f"--results={tmp_path / 'table.md'}", "--title=Grasping", "--env=fr5_grasp", "--license=mit"]
-    main(["export", "checkpoint", f"--out={tmp_path / 'small'}", *options])
-    assert asked[0][2] == CardFacts(
-        title="Grasping", env_type="fr5_grasp", results="98 of 100", license="mit"
+    given = {"title": "Grasping", "env": "fr5_grasp", "license": "mit", "results": tmp_path / "table.md"}
+    for out, settings in (("plain", {}), ("full", given)):
+        assert run(ExportArguments(checkpoint=Path("run"), out=tmp_path / out, **settings)) == 0
+    full = CardFacts(title="Grasping", env_type="fr5_grasp", results="98 of 100", license="mit")
+    assert asked == [(Path("run"), CardFacts()), (Path("run"), full)]
+    assert (
+        f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n"
+        in capsys.readouterr().out
     )
 
 
-def test_a_folder_that_is_no_checkpoint_is_an_error(tmp_path, capsys):
-    assert main(["export", str(tmp_path), f"--out={tmp_path / 'small'}"]) == 2
-    assert "pretrained_model" in capsys.readouterr().err
+@pytest.mark.parametrize("checkpoint", [None, Path("no/such/folder")])
+def test_what_is_not_a_checkpoint_is_an_error_that_says_what_to_give(tmp_path, checkpoint):
+    with pytest.raises(ConfigurationError, match=r"checkpoint.*give the pretrained_model"):
+        run(ExportArguments(checkpoint=checkpoint, out=tmp_path / "small"))

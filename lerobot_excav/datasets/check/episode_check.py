@@ -41,9 +41,9 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
     ):
         if not np.isfinite(values).all():
             yield f"{name} is not finite at frame {int(np.argmin(np.isfinite(values).all(axis=1)))}"
-    names = episode.environment.action_names
+    names = episode.spec.action_names
     for name, values, low, high in zip(
-        names, episode.action.T, *episode.environment.action_limits, strict=True
+        names, episode.action.T, episode.spec.action_low, episode.spec.action_high, strict=True
     ):
         margin = ACTION_MARGIN * (high - low)
         outside = values[(values < low - margin) | (values > high + margin)]
@@ -53,13 +53,18 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
 
 
 def _mask_problems(episode: EpisodeTable) -> Iterator[str]:
-    if episode.distinct_images(MASK_KEY) != 1:
-        yield "the target mask changes within the episode"
-    mask_img = episode.image(MASK_KEY, 0)
-    if not np.isin(mask_img, (0, 255)).all():
-        yield f"the target mask is not binary: it holds {np.unique(mask_img)[:4].tolist()}; allowed are 0 and 255"
-    elif not mask_img.any():
-        yield "the target mask is empty"
+    """Check the mask under each command: it changes with the command only, is binary and marks something."""
+    starts = [0, *(frame for frame, _ in episode.schedule)]
+    digests = episode.image_digests(MASK_KEY)
+    for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
+        if len(set(digests[start:end])) != 1:
+            yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
+        mask_img = episode.image(MASK_KEY, start)
+        if not np.isin(mask_img, (0, 255)).all():
+            values = np.unique(mask_img)[:4].tolist()
+            yield f"the target mask is not binary at frame {start}: it holds {values}; allowed are 0 and 255"
+        elif not mask_img.any() and "zero" not in episode.mask_words:
+            yield f"the target mask is empty from frame {start} on"
 
 
 def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:

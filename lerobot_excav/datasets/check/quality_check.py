@@ -13,9 +13,7 @@ from lerobot_excav.datasets.check.replay_check import replay_problem
 from lerobot_excav.datasets.check.version_check import require_this_simulation, versions_of
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import require_columns
-from lerobot_excav.datasets.pairs.pair_coverage import START_SETTINGS
 from lerobot_excav.datasets.pairs.paired_index import FAILED, PASSED, build_index, index_keys, store_index
-from lerobot_excav.datasets.record.rig import Rig
 from lerobot_excav.errors import require
 
 
@@ -25,7 +23,6 @@ def check_dataset(
     episodes: Collection[int] | None = None,
     replays: int = 3,
     seed: int = 0,
-    rig: Rig | None = None,
 ) -> pd.DataFrame:
     """Check a dataset and note the verdicts in its index.
 
@@ -34,7 +31,6 @@ def check_dataset(
         episodes: Episodes to check; all by default.
         replays: How many of them to replay, chosen at random.
         seed: Seed of that choice.
-        rig: Makes the environment of the replays; that of the dataset by default.
 
     Returns:
         The checked rows of the index, with `qc` (`passed` or `failed`), `qc_problem` and `replayed`.
@@ -45,8 +41,8 @@ def check_dataset(
         ConfigurationError: An episode that does not exist, or a negative number of replays.
     """
     info = read_info(root)
-    environment = info.environment
-    require_columns(environment, info.features)
+    spec = info.spec
+    require_columns(spec, info.features)
     wanted = sorted(range(info.total_episodes) if episodes is None else set(episodes))
     unknown = [index for index in wanted if not 0 <= index < info.total_episodes]
     require(
@@ -56,20 +52,19 @@ def check_dataset(
     require(replays >= 0, f"--replays={replays} must not be negative")
 
     index = build_index(root)
-    problems = _static_problems(root, wanted, index_keys(environment))
+    problems = _static_problems(root, wanted, index_keys(spec))
     sound = [number for number in wanted if not problems[number]]
     sample = np.random.default_rng(seed).permutation(sound)[:replays].tolist()
     if sample:
         versions = versions_of(index)
         require_this_simulation(
-            environment,
+            spec,
             {i: versions[i] for i in wanted},
             source=root,
             instead="; --replays=0 checks all but replays",
         )
-        rig = rig or environment.rig(with_images=False)
-        for recorded in iterate_episodes(root, index_keys(environment), episodes=sample):
-            problem = replay_problem(rig, recorded, fps=info.fps)
+        for recorded in iterate_episodes(root, index_keys(spec), episodes=sample):
+            problem = replay_problem(recorded, fps=info.fps)
             problems[recorded.index] = [problem] if problem else []
 
     checked = index["episode_index"].isin(wanted)
@@ -96,4 +91,6 @@ def _static_problems(root: Path, wanted: list[int], keys: list[str]) -> dict[int
 
 def _start(episode: EpisodeTable) -> list[str]:
     """Return the settings, besides the scene, that determine how an episode starts; fidelity does not."""
-    return [value for name, value in episode.settings.items() if name in START_SETTINGS]
+    return [
+        value for name, value in episode.settings.items() if name in episode.spec.settings.start_columns()
+    ]

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.datasets.record.environment import EnvironmentDescription
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
 
 
 def require_this_simulation(
-    environment: EnvironmentDescription, versions: Mapping[int, int], *, source: Path, instead: str
+    spec: TaskSpec, versions: Mapping[int, int], *, source: Path, instead: str
 ) -> None:
     """Check that episodes can be replayed by this version of the simulation.
 
     Args:
-        environment: Where the episodes come from.
+        spec: Task of the robot that they were recorded with.
         versions: Version of the simulation by episode index.
         source: The dataset, or the file that names the versions.
         instead: What can be done without a replay, for the message.
@@ -24,11 +24,11 @@ def require_this_simulation(
     Raises:
         DatasetError: An episode is of another version.
     """
-    current = environment.simulation_version
+    current = spec.simulation_version
     for version, episodes in sorted(episodes_by_version(versions).items()):
         if version != current:
             newer = max(version, current)
-            changes = environment.changes.get(newer, "unknown to this older package")
+            changes = spec.changes.get(newer, "unknown to this older package")
             raise DatasetError(
                 f"{source}: {describe_episodes(episodes)} of version {version} of the simulation cannot be replayed "
                 f"in version {current}, which this is (version {newer}: {changes}). Record again, or "

@@ -1,6 +1,5 @@
 """Whether a recording of `lerobot-record` can be completed from its session."""
 
-import functools
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,9 @@ from lerobot_excav.datasets.check.version_check import require_this_simulation
 from lerobot_excav.datasets.complete.session import SessionEpisode
 from lerobot_excav.datasets.format.episode_table import iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import MASK_KEY, excav_features, require_columns
-from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.datasets.record.simulation import make_environment
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import DatasetError
 
 MASK_OVERLAP = 0.8
@@ -23,34 +24,35 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
     """Check that a recording lacks the `excav.*` columns only, and was made as its session says, in this simulation.
 
     Raises:
-        DatasetError: It is not so.
+        DatasetError: It has them already, lacks others, or was made otherwise.
     """
     info = read_info(root)
-    environment = info.environment
-    added = excav_features(environment)
+    spec = info.spec
+    added = excav_features(spec)
     present = [key for key in added if key in info.features]
     if present:
         raise DatasetError(
             f"{root} has {', '.join(present)} already; run `lerobot-excav index {root}` without --session"
         )
-    require_columns(environment, info.features | added)
+    require_columns(spec, info.features | added)
     missing = [index for index in range(info.total_episodes) if index not in session]
     if missing:
         raise DatasetError(
             f"the session has no line for episodes {missing}; is it the session of this recording?"
         )
     versions = {index: session[index].simulation_version for index in range(info.total_episodes)}
-    require_this_simulation(environment, versions, source=root, instead="")
+    require_this_simulation(spec, versions, source=root, instead="")
     for index in range(info.total_episodes):
         episode = session[index]
-        if episode.env != environment.name:
+        if episode.env != spec.env_type:
             raise DatasetError(
-                f"episode {index}: the session is of {episode.env}, the recording of {environment.name}; "
+                f"episode {index}: the session is of {episode.env}, the recording of {spec.env_type}; "
                 "is it the session of this recording?"
             )
-        if episode.fps != info.fps:
+        fps = episode.task_settings.fps
+        if fps != info.fps:
             raise DatasetError(
-                f"episode {index}: the robot ran at {episode.fps} frames/s, the dataset has {info.fps}; "
+                f"episode {index}: the robot ran at {fps} frames/s, the dataset has {info.fps}; "
                 "record with --robot.fps equal to --dataset.fps"
             )
 
@@ -78,27 +80,31 @@ def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_resta
     return whole
 
 
-def require_recorded_targets(root: Path, session: dict[int, SessionEpisode], rig: Rig) -> None:
-    """Check that every episode has the length and the mask that its line of the session announces.
+def require_recorded_targets(root: Path, session: dict[int, SessionEpisode]) -> None:
+    """Check that every episode has the length and the first mask that its line of the session announces.
+
+    Masks of later commands depend on what has happened by then; they are checked with the states.
 
     Raises:
         DatasetError: One has not.
     """
     hint = "was the dataset edited after recording? Index first, edit afterwards"
     with ExitStack() as stack:
-        # All episodes of a session share their settings, and a graphics context is slow to open.
-        environment = functools.cache(
-            lambda settings: stack.enter_context(closing(rig.environment(settings)))
-        )
+        envs: list[tuple[TaskSettings, MaskedTaskEnv[Any, Any]]] = []
         for recorded in iterate_episodes(root, (MASK_KEY,)):
             episode = session[recorded.index]
-            if episode.frames not in (None, recorded.length):
+            if episode.frames != recorded.length:
                 raise DatasetError(
                     f"episode {recorded.index} has {recorded.length} frames, but the session noted "
                     f"{episode.frames} for {episode.pair.uid}; {hint}"
                 )
-            options = {"scene_id": episode.scene_id, "target_id": episode.target_id}
-            observation, _ = environment(episode.settings()).reset(options=options)
+            settings = episode.task_settings
+            # All episodes of a session share their settings, and a graphics context is slow to open.
+            if not envs or envs[-1][0] != settings:
+                env = stack.enter_context(closing(make_environment(settings, with_images=True)))
+                envs.append((settings, env))
+            options = {"scene_id": episode.scene_id, "target_id": episode.pair.target_id}
+            observation, _ = envs[-1][1].reset(options=options)
             if not _same_mask(recorded.image(MASK_KEY, 0), observation["pixels"]["target_mask"]):
                 raise DatasetError(
                     f"episode {recorded.index} does not show the target mask of {episode.pair.uid}, "

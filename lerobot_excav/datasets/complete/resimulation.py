@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
-from numpy.typing import NDArray
 
 from lerobot_excav.datasets.complete.recording_check import (
     require_completable,
@@ -25,6 +24,7 @@ from lerobot_excav.datasets.complete.session import SessionEpisode, read_session
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import (
     ACTION_KEY,
+    MASK_SOURCE_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
@@ -37,7 +37,7 @@ from lerobot_excav.datasets.format.schema import (
 )
 from lerobot_excav.datasets.pairs.paired_index import write_index
 from lerobot_excav.datasets.record.episode import Episode, replay
-from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.datasets.record.simulation import make_replay_environment
 from lerobot_excav.errors import DatasetError
 
 STATE_TOLERANCE = 1e-4
@@ -50,7 +50,6 @@ def complete_recording(
     *,
     out: Path | None = None,
     skip_restarted: bool = False,
-    rig: Rig | None = None,
 ) -> Path:
     """Add the `excav.*` columns to a recording, and its index.
 
@@ -59,7 +58,6 @@ def complete_recording(
         session_path: Session log of the simulated robot.
         out: Where to put the completed dataset; it replaces `root` by default.
         skip_restarted: Whether to leave out episodes in which the scene was restarted, instead of refusing them.
-        rig: Makes the environment; that of the recording by default.
 
     Returns:
         Folder of the completed dataset.
@@ -71,7 +69,6 @@ def complete_recording(
         raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
     session = read_session(session_path)
     require_completable(root, session)
-    environment = read_info(root).environment
     whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
     # Beside the destination, so that the last step is a rename.
     temporary = (out or root).with_name(f".{root.name}.{uuid.uuid4().hex[:8]}")
@@ -79,8 +76,8 @@ def complete_recording(
         with _reduced(root, whole, temporary.with_name(f"{temporary.name}.whole")) as reduced:
             # Leaving episodes out renumbers the others.
             renumbered = {number: session[index] for number, index in enumerate(whole)}
-            require_recorded_targets(reduced, renumbered, rig or environment.rig())
-            episodes = _resimulate_all(reduced, renumbered, rig or environment.rig(with_images=False))
+            require_recorded_targets(reduced, renumbered)
+            episodes = _resimulate_all(reduced, renumbered)
             _write_completed(reduced, episodes, renumbered, temporary)
         write_index(temporary)
         return _put_in_place(temporary, root, out)
@@ -103,18 +100,24 @@ def _reduced(root: Path, episodes: list[int], copy: Path) -> Iterator[Path]:
         shutil.rmtree(copy, ignore_errors=True)
 
 
-def _resimulate_all(root: Path, session: dict[int, SessionEpisode], rig: Rig) -> dict[int, Episode]:
+def _resimulate_all(root: Path, session: dict[int, SessionEpisode]) -> dict[int, Episode]:
     return {
-        recorded.index: _resimulate(rig, recorded, session[recorded.index])
+        recorded.index: _resimulate(recorded, session[recorded.index])
         for recorded in iterate_episodes(root, (STATE_KEY, ACTION_KEY))
     }
 
 
-def _resimulate(rig: Rig, recorded: EpisodeTable, session: SessionEpisode) -> Episode:
-    limit = recorded.environment.replay_length(recorded.length)
-    env = rig.environment(session.settings(episode_length=limit))
+def _resimulate(recorded: EpisodeTable, session: SessionEpisode) -> Episode:
+    settings = session.task_settings
+    env = make_replay_environment(
+        recorded.spec,
+        scene_set=settings.scene_set,
+        fps=settings.fps,
+        columns={name: getattr(settings, name) for name in settings.columns()},
+        frames=recorded.length,
+    )
     try:
-        played = replay(env, recorded.action, session.pair)
+        played = replay(env, recorded.action, session.pair, session.schedule)
     finally:
         env.close()
     deviation = np.abs(played.state - recorded.state).max(axis=1)
@@ -132,26 +135,27 @@ def _write_completed(
     root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path
 ) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
-    environment = read_info(root).environment
-    columns = excav_features(environment)
+    spec = read_info(root).spec
+    columns = excav_features(spec)
 
     def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
         return lambda row, episode, frame: values[int(episode)], columns[key]
 
-    def task_state(row: dict[str, Any], episode: int, frame: int) -> NDArray[Any]:
-        values: NDArray[Any] = episodes[int(episode)].task_state[int(frame)]
-        return values
+    def varying(key: str, name: str) -> tuple[Any, dict[str, Any]]:
+        return lambda row, episode, frame: getattr(episodes[int(episode)], name)[int(frame)], columns[key]
 
+    settings = {i: session[i].task_settings for i in episodes}
     features = {
         SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),
-        TARGET_KEY: constant(TARGET_KEY, {i: e.pair.target_id for i, e in episodes.items()}),
+        TARGET_KEY: varying(TARGET_KEY, "target_id"),
         PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
-        TASK_STATE_KEY: (task_state, columns[TASK_STATE_KEY]),
+        TASK_STATE_KEY: varying(TASK_STATE_KEY, "task_state"),
         SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
-        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, environment.simulation_version)),
+        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, spec.simulation_version)),
+        MASK_SOURCE_KEY: constant(MASK_SOURCE_KEY, {i: s.mask_words for i, s in settings.items()}),
         **{
-            setting_key(name): constant(setting_key(name), {i: session[i].extra[name] for i in episodes})
-            for name in environment.settings
+            setting_key(name): constant(setting_key(name), {i: getattr(s, name) for i, s in settings.items()})
+            for name in spec.settings.columns()
         },
     }
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")

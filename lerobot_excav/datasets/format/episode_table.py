@@ -19,6 +19,7 @@ from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.pictures import Pictures, StoredImages, VideoSpan
 from lerobot_excav.datasets.format.schema import (
     ACTION_KEY,
+    MASK_SOURCE_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
@@ -27,10 +28,10 @@ from lerobot_excav.datasets.format.schema import (
     TARGET_KEY,
     TASK_STATE_KEY,
     setting_key,
-    unmarked_columns,
 )
-from lerobot_excav.datasets.record.environment import EnvironmentDescription
-from lerobot_excav.datasets.record.environments import environment_of_robot
+from lerobot_excav.envs.tasks.registry import task_of_robot
+from lerobot_excav.envs.tasks.selection import Schedule
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
 
 CODEBASE_VERSION = "v3.0"
@@ -43,14 +44,14 @@ class EpisodeTable:
     Attributes:
         index: Episode index.
         length: Number of frames.
-        environment: Where it comes from.
+        spec: Task of the robot that it was recorded with.
         columns: The columns asked for, by key, without pictures.
         pictures: The pictures asked for, by key, undecoded.
     """
 
     index: int
     length: int
-    environment: EnvironmentDescription
+    spec: TaskSpec
     columns: dict[str, pa.ChunkedArray]
     pictures: dict[str, Pictures]
 
@@ -85,26 +86,43 @@ class EpisodeTable:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Settings that not every environment has, such as the soil, by name."""
-        return {name: str(self._constant(setting_key(name))) for name in self.environment.settings}
+        """Settings that are kept in every frame, such as the soil, by name."""
+        return {name: str(self._constant(setting_key(name))) for name in self.spec.settings.columns()}
+
+    @property
+    def mask_words(self) -> str:
+        """What the mask shows, in words."""
+        return str(self._constant(MASK_SOURCE_KEY))
+
+    @property
+    def target_id(self) -> NDArray[Any]:
+        """Target that is commanded, (n,)."""
+        return self.array(TARGET_KEY)
+
+    @property
+    def schedule(self) -> Schedule:
+        """Changes of the command, as pairs of frame and target."""
+        targets = self.target_id
+        changes = (np.flatnonzero(np.diff(targets)) + 1).tolist()
+        return tuple((frame, int(targets[frame])) for frame in changes)
 
     @property
     def pair(self) -> Pair:
-        """Scene and target.
+        """Scene, and the target that is commanded first.
 
         Raises:
             DatasetError: The columns contradict each other.
         """
         pair = Pair.parse(self._constant(PAIR_KEY))
-        ids = (self._constant(SCENE_KEY), self._constant(TARGET_KEY))
-        if pair.env != self.environment.name:
+        ids = (self._constant(SCENE_KEY), int(self.target_id[0]))
+        if pair.env != self.spec.env_type:
             raise DatasetError(
                 f"episode {self.index}: {PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's robot_type is "
-                f"that of {self.environment.name!r}"
+                f"that of {self.spec.env_type!r}"
             )
         if ids != (pair.scene_id, pair.target_id):
             raise DatasetError(
-                f"episode {self.index}: scene and target {ids} contradict {PAIR_KEY}={pair.uid!r}"
+                f"episode {self.index}: scene and first target {ids} contradict {PAIR_KEY}={pair.uid!r}"
             )
         return pair
 
@@ -121,9 +139,9 @@ class EpisodeTable:
         """Return a decoded picture, (H, W, 3) uint8."""
         return self.pictures[key].frame(frame)
 
-    def distinct_images(self, key: str) -> int:
-        """Count different pictures."""
-        return self.pictures[key].distinct()
+    def image_digests(self, key: str) -> list[bytes]:
+        """Return a digest of every picture; equal pictures of one writer have equal digests."""
+        return self.pictures[key].digests()
 
     def _constant(self, key: str) -> Any:
         values = pc.unique(self.columns[key]).to_pylist()
@@ -153,13 +171,13 @@ class DatasetInfo:
     video_path: str | None
 
     @property
-    def environment(self) -> EnvironmentDescription:
-        """The environment that the dataset comes from.
+    def spec(self) -> TaskSpec:
+        """Task of the robot that the dataset was recorded with; all tasks of a robot share its columns.
 
         Raises:
-            DatasetError: It comes from elsewhere.
+            DatasetError: It was recorded with another robot.
         """
-        return environment_of_robot(self.robot_type)
+        return task_of_robot(self.robot_type)
 
 
 def read_info(root: Path) -> DatasetInfo:
@@ -192,7 +210,7 @@ def iterate_episodes(
 
     Args:
         root: The dataset.
-        keys: Columns to read. Those of `schema.unmarked_columns` that a dataset lacks are filled in.
+        keys: Columns to read.
         episodes: Episode indices; all by default.
 
     Yields:
@@ -204,11 +222,11 @@ def iterate_episodes(
     spans = _video_spans(root, info, stored["video"])
     columns = [key for key in keys if key not in stored["video"]]
     for path in sorted(root.glob("data/*/*.parquet")):
-        for index, rows in _episodes_of_file(path, columns, wanted, info.environment):
+        for index, rows in _episodes_of_file(path, columns, wanted):
             yield EpisodeTable(
                 index=index,
                 length=rows.num_rows,
-                environment=info.environment,
+                spec=info.spec,
                 columns={key: rows[key] for key in columns if key not in stored["image"]},
                 pictures={
                     **{key: StoredImages(rows[key]) for key in stored["image"]},
@@ -238,26 +256,16 @@ def _video_spans(root: Path, info: DatasetInfo, keys: Sequence[str]) -> dict[int
     return spans
 
 
-def _episodes_of_file(
-    path: Path, keys: Sequence[str], wanted: set[int], environment: EnvironmentDescription
-) -> Iterator[tuple[int, pa.Table]]:
+def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iterator[tuple[int, pa.Table]]:
     parquet = pq.ParquetFile(path)
     columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
     for group in range(parquet.num_row_groups):
         # LeRobot writes one row group per episode; a file written by something else just costs more memory.
-        table = _marked(parquet.read_row_group(group, columns=columns), columns, environment)
+        table = parquet.read_row_group(group, columns=columns)
         for index in pc.unique(table["episode_index"]).to_pylist():
             if index in wanted:
                 rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
                 yield index, rows
-
-
-def _marked(table: pa.Table, columns: Sequence[str], environment: EnvironmentDescription) -> pa.Table:
-    """Fill in columns that were asked for and that the first version of the simulation did not write."""
-    for key, value in unmarked_columns(environment).items():
-        if key in columns and key not in table.column_names:
-            table = table.append_column(key, pa.array([value] * table.num_rows))
-    return table
 
 
 def require_single_task(root: Path, episodes: Collection[int]) -> None:

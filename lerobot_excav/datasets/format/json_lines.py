@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pydantic import BaseModel, ValidationError
+
 from lerobot_excav.errors import DatasetError
 
 
@@ -17,6 +19,22 @@ class Line(NamedTuple):
 
     place: str
     record: dict[str, Any]
+
+    def read[Model: BaseModel](self, model: type[Model], *, hint: str) -> Model:
+        """Make an object of the line.
+
+        Args:
+            model: What it should be.
+            hint: What to do if it is something else.
+
+        Raises:
+            DatasetError: A field is missing, unknown or has a value that is not possible; the message names each.
+        """
+        try:
+            return model.model_validate(self.record)
+        except ValidationError as error:
+            problems = "; ".join(_in_words(problem) for problem in error.errors())
+            raise DatasetError(f"{self.place}: {problems}; {hint}") from None
 
 
 def read_json_lines(path: Path, *, origin: str) -> list[Line]:
@@ -46,3 +64,12 @@ def _line(text: str, place: str) -> Line:
     if not isinstance(record, dict):
         raise DatasetError(f"{place}: a JSON object is expected, not {text[:40]!r}")
     return Line(place, record)
+
+
+def _in_words(problem: Any) -> str:
+    name = ".".join(map(str, problem["loc"]))
+    if problem["type"] == "missing":
+        return f"lacks {name}"
+    if problem["type"] == "extra_forbidden":
+        return f"{name} is not known"
+    return f"{name}={problem['input']!r}: {problem['msg']}"

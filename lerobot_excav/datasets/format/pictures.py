@@ -1,5 +1,6 @@
 """The pictures of one camera in one episode, wherever a dataset keeps them: in the table of frames or in a video."""
 
+import hashlib
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ class Pictures(Protocol):
     def frame(self, number: int) -> NDArray[Any]:
         """Return a picture, (H, W, 3) uint8."""
 
-    def distinct(self) -> int:
-        """Count different pictures."""
+    def digests(self) -> list[bytes]:
+        """Return a digest of every picture; equal pictures of one writer have equal digests."""
 
     def first(self) -> "Pictures":
         """Return something that holds the first picture only, so that the rest can be forgotten."""
@@ -41,9 +42,9 @@ class StoredImages:
         """Return a picture, (H, W, 3) uint8."""
         return np.asarray(Image.open(io.BytesIO(self.column[number]["bytes"].as_py())).convert("RGB"))
 
-    def distinct(self) -> int:
-        """Count pictures that differ in their file bytes; equal pictures of one writer have equal bytes."""
-        return len({value["bytes"].as_py() for value in self.column})
+    def digests(self) -> list[bytes]:
+        """Return a digest of every file."""
+        return [hashlib.sha256(value["bytes"].as_py()).digest() for value in self.column]
 
     def first(self) -> "StoredImages":
         """Return a copy of the first picture."""
@@ -70,9 +71,9 @@ class VideoSpan:
         """Return a picture, (H, W, 3) uint8."""
         return next(self._from(number))
 
-    def distinct(self) -> int:
-        """Count different pictures."""
-        return len({picture.tobytes() for picture in self._from(0)})
+    def digests(self) -> list[bytes]:
+        """Return a digest of every picture."""
+        return [hashlib.sha256(picture.tobytes()).digest() for picture in self._from(0)]
 
     def first(self) -> "VideoSpan":
         """Return the span itself: it holds no picture."""

@@ -3,13 +3,14 @@
 The keys that `lerobot-record` writes from a simulated robot are described exactly as it describes them, so that
 recorded, scripted and rolled-out data merge. The `excav.*` columns are the truth about scene, target and outcome: they
 are ordinary per-frame columns, the only carrier that survives delete, split, merge and push. The scene set is part of
-`excav.pair_uid`.
+`excav.pair_uid`. Target and mask are those in force in that frame: a command may change within an episode, and then
+`excav.pair_uid` names the first.
 """
 
 from typing import Any
 
 from lerobot_excav.datasets.format.storage import require_lossless
-from lerobot_excav.datasets.record.environment import EnvironmentDescription
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
 
 STATE_KEY = "observation.state"
@@ -20,6 +21,7 @@ TARGET_KEY = "excav.target_id"
 PAIR_KEY = "excav.pair_uid"
 TASK_STATE_KEY = "excav.task_state"
 SUCCESS_KEY = "excav.success"
+MASK_SOURCE_KEY = "excav.mask_source"
 SIMULATION_KEY = "excav.simulation_version"
 Feature = dict[str, Any]
 
@@ -30,21 +32,13 @@ def camera_key(camera: str) -> str:
 
 
 def setting_key(name: str) -> str:
-    """Return the dataset key of a setting that not every environment has."""
+    """Return the dataset key of a setting that is kept in every frame, such as the soil."""
     return f"excav.{name}"
 
 
-def unmarked_columns(environment: EnvironmentDescription) -> dict[str, int | str]:
-    """Return what is taken to stand in columns that the first version of the simulation did not write."""
-    if environment.unmarked_version is None:
-        return {}
-    settings = {setting_key(name): setting.unmarked for name, setting in environment.settings.items()}
-    return {SIMULATION_KEY: environment.unmarked_version, **settings}
-
-
-def excav_features(environment: EnvironmentDescription) -> dict[str, Feature]:
+def excav_features(spec: TaskSpec) -> dict[str, Feature]:
     """Describe the columns that LeRobot's recorder does not know."""
-    names = list(environment.task_state_names)
+    names = list(spec.task_state_names)
     return {
         SCENE_KEY: {"dtype": "int64", "shape": (1,), "names": None},
         TARGET_KEY: {"dtype": "int64", "shape": (1,), "names": None},
@@ -53,19 +47,19 @@ def excav_features(environment: EnvironmentDescription) -> dict[str, Feature]:
         SUCCESS_KEY: {"dtype": "bool", "shape": (1,), "names": None},
         SIMULATION_KEY: {"dtype": "int64", "shape": (1,), "names": None},
         **{
-            setting_key(name): {"dtype": "string", "shape": (1,), "names": None}
-            for name in environment.settings
+            key: {"dtype": "string", "shape": (1,), "names": None}
+            for key in (MASK_SOURCE_KEY, *map(setting_key, spec.settings.columns()))
         },
     }
 
 
 def dataset_features(
-    environment: EnvironmentDescription, *, height: int, width: int, storage: str = "image"
+    spec: TaskSpec, *, height: int, width: int, storage: str = "image"
 ) -> dict[str, Feature]:
     """Describe every column of a dataset in LeRobot's terms.
 
     Args:
-        environment: Where it comes from.
+        spec: Task of the robot that it was recorded with.
         height: Image height [px].
         width: Image width [px].
         storage: `image` (PNG) or `video`; see `storage`.
@@ -73,12 +67,12 @@ def dataset_features(
     Returns:
         Feature descriptions by key.
     """
-    action, state = list(environment.action_names), list(environment.state_names)
+    action, state = list(spec.action_names), list(spec.state_names)
     features: dict[str, Feature] = {
         ACTION_KEY: {"dtype": "float32", "shape": (len(action),), "names": action},
         STATE_KEY: {"dtype": "float32", "shape": (len(state),), "names": state},
     }
-    for camera in environment.cameras:
+    for camera in spec.cameras:
         features[camera_key(camera)] = {
             "dtype": storage,
             "shape": (height, width, 3),
@@ -86,24 +80,21 @@ def dataset_features(
             # The recorder writes this for every camera; merging compares it.
             "info": {"is_depth_map": False},
         }
-    return features | excav_features(environment)
+    return features | excav_features(spec)
 
 
-def require_columns(environment: EnvironmentDescription, features: dict[str, Feature]) -> None:
+def require_columns(spec: TaskSpec, features: dict[str, Feature]) -> None:
     """Check that a dataset has the columns of this schema with the right types.
 
-    `unmarked_columns` may be missing together: the excavator's datasets of the first version have no such columns.
-
     Args:
-        environment: Where the dataset comes from.
+        spec: Task of the robot that the dataset was recorded with.
         features: Feature descriptions of the dataset.
 
     Raises:
         DatasetError: A column is missing or is of another type, or pictures were compressed with losses.
     """
-    expected = dataset_features(environment, height=0, width=0)
-    optional = unmarked_columns(environment) if SIMULATION_KEY not in features else {}
-    missing = [key for key in expected if key not in features and key not in optional]
+    expected = dataset_features(spec, height=0, width=0)
+    missing = [key for key in expected if key not in features]
     if missing:
         hint = "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`"
         raise DatasetError(f"the dataset lacks {', '.join(missing)}; {hint}")

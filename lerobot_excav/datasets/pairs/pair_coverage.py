@@ -4,25 +4,25 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from lerobot_excav.envs.tasks.registry import env_types
+
 SCENE_COLUMNS = ["env", "scene_set", "scene_id"]
 """What numbers a scene."""
 
-START_SETTINGS = ("soil",)
-"""Settings, where there are such, that make the same scene another start: another soil is another pile."""
+
+def start_settings(index: pd.DataFrame) -> list[str]:
+    """Return the settings that make the same scene another start, such as the soil: another soil is another pile."""
+    return list(env_types()[index["env"].iloc[0]].settings.start_columns()) if len(index) else []
 
 
 def start_columns(index: pd.DataFrame) -> list[str]:
     """Return the columns that determine a starting situation: the same scene is another pile on another soil."""
-    return [*SCENE_COLUMNS, *_settings(index)]
+    return [*SCENE_COLUMNS, *start_settings(index)]
 
 
 def pair_columns(index: pd.DataFrame) -> list[str]:
     """Return the columns that name a start shown with a target."""
-    return ["pair_uid", *_settings(index)]
-
-
-def _settings(index: pd.DataFrame) -> list[str]:
-    return [name for name in START_SETTINGS if name in index]
+    return ["pair_uid", *start_settings(index)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ def pair_coverage(index: pd.DataFrame) -> PairCoverage:
         Counts, missing targets and duplicates.
     """
     targets = set(index["target_id"])
-    varied = [name for name in _settings(index) if index[name].nunique() > 1]
+    varied = [name for name in start_settings(index) if index[name].nunique() > 1]
     named = index.assign(
         scene=_joined(index, SCENE_COLUMNS, "/") + _suffix(index, varied),
         pair=index["pair_uid"] + _suffix(index, varied),

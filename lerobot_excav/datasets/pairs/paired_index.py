@@ -17,6 +17,7 @@ from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_ep
 from lerobot_excav.datasets.format.schema import (
     ACTION_KEY,
     MASK_KEY,
+    MASK_SOURCE_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
@@ -27,14 +28,14 @@ from lerobot_excav.datasets.format.schema import (
     require_columns,
     setting_key,
 )
-from lerobot_excav.datasets.record.environment import EnvironmentDescription
+from lerobot_excav.envs.tasks.task import TaskSpec
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
 
 UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
 
 
-def index_keys(environment: EnvironmentDescription) -> list[str]:
+def index_keys(spec: TaskSpec) -> list[str]:
     """Return the columns of a dataset that its index is derived from."""
     return [
         STATE_KEY,
@@ -46,7 +47,8 @@ def index_keys(environment: EnvironmentDescription) -> list[str]:
         TASK_STATE_KEY,
         SUCCESS_KEY,
         SIMULATION_KEY,
-        *(setting_key(name) for name in environment.settings),
+        MASK_SOURCE_KEY,
+        *(setting_key(name) for name in spec.settings.columns()),
     ]
 
 
@@ -64,8 +66,8 @@ def build_index(root: Path) -> pd.DataFrame:
         DatasetError: A column is missing, or contradicts another.
     """
     info = read_info(root)
-    require_columns(info.environment, info.features)
-    rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.environment))]
+    require_columns(info.spec, info.features)
+    rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.spec))]
     index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
     return _with_verdicts(index, _stored(root))
 
@@ -91,12 +93,15 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
         "pair_uid": pair.uid,
         "episode_index": episode.index,
         **pair._asdict(),
+        "final_target_id": int(episode.target_id[-1]),
+        "commands": 1 + len(episode.schedule),
         "simulation_version": episode.simulation_version,
         **episode.settings,
+        "mask_source": episode.mask_words,
         "length": episode.length,
         "success": episode.success,
         **_mask_summary(episode.image(MASK_KEY, 0)),
-        **episode.environment.outcome(episode.task_state),
+        **episode.spec.measures.outcome(episode.task_state),
         "fingerprint": fingerprint(episode),
     }
 
@@ -115,6 +120,7 @@ def _mask_summary(mask_img: NDArray[Any]) -> dict[str, float]:
 def fingerprint(episode: EpisodeTable) -> str:
     """Return a digest of what was seen of the joints and commanded, which an edit of the dataset does not change."""
     digest = hashlib.sha256(episode.columns[PAIR_KEY][0].as_py().encode())
+    digest.update(repr(episode.schedule).encode())
     for trace in (episode.state, episode.action):
         digest.update(np.ascontiguousarray(trace, dtype=np.float32).tobytes())
     return digest.hexdigest()[:16]

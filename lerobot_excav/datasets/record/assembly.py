@@ -13,6 +13,7 @@ from lerobot.datasets import LeRobotDataset
 
 from lerobot_excav.datasets.format.schema import (
     ACTION_KEY,
+    MASK_SOURCE_KEY,
     PAIR_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
@@ -54,16 +55,19 @@ def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDatase
         settings: What will be recorded.
     """
     features = dataset_features(
-        settings.environment, height=settings.height, width=settings.width, storage=settings.storage
+        settings.task_spec,
+        height=settings.env.observation_height,
+        width=settings.env.observation_width,
+        storage=str(settings.storage),
     )
     return LeRobotDataset.create(
         repo_id=f"local/{root.name}",
         root=root,
-        fps=settings.fps,
+        fps=settings.env.fps,
         features=features,
-        robot_type=settings.environment.robot_type,
+        robot_type=settings.task_spec.robot_type,
         video_backend="pyav",  # never used; looking for a better one prints a page where none is installed
-        **_WRITERS[settings.storage](settings),
+        **_WRITERS[str(settings.storage)](settings),
     )
 
 
@@ -101,17 +105,18 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
     """
     constant = {
         SCENE_KEY: np.array([episode.pair.scene_id], dtype=np.int64),
-        TARGET_KEY: np.array([episode.pair.target_id], dtype=np.int64),
         PAIR_KEY: episode.pair.uid,
         SUCCESS_KEY: np.array([episode.success]),
-        SIMULATION_KEY: np.array([settings.environment.simulation_version], dtype=np.int64),
-        **{setting_key(name): value for name, value in settings.extra.items()},
+        SIMULATION_KEY: np.array([settings.task_spec.simulation_version], dtype=np.int64),
+        MASK_SOURCE_KEY: settings.env.mask_words,
+        **{setting_key(name): getattr(settings.env, name) for name in settings.task_spec.settings.columns()},
         "task": episode.task,
     }
     for frame in range(episode.length):
         varying = {
             STATE_KEY: episode.state[frame],
             ACTION_KEY: episode.action[frame],
+            TARGET_KEY: episode.target_id[frame : frame + 1],
             TASK_STATE_KEY: episode.task_state[frame],
         }
         images = {camera_key(camera): frames[frame] for camera, frames in episode.images.items()}

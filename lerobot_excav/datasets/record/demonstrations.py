@@ -19,7 +19,6 @@ from lerobot_excav.datasets.record.episode_store import EpisodeStore
 from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.provenance import read_provenance, write_provenance
-from lerobot_excav.datasets.record.rig import Rig
 from lerobot_excav.datasets.record.simulation import simulate_episode
 from lerobot_excav.datasets.record.workers import episode_result, require_workers, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
@@ -52,7 +51,6 @@ def record_demonstrations(
     *,
     workers: int = 2,
     resume: bool = False,
-    rig: Rig | None = None,
     show_progress: bool = True,
 ) -> DemonstrationSummary:
     """Record scripted demonstrations as a LeRobot dataset.
@@ -62,7 +60,6 @@ def record_demonstrations(
         out: Folder of the dataset.
         workers: Worker processes; 0 works in this process.
         resume: Whether to continue an interrupted run.
-        rig: Environment and operator; those of the settings by default.
         show_progress: Whether to draw a progress bar.
 
     Returns:
@@ -78,15 +75,14 @@ def record_demonstrations(
         outcomes = _require_finished(out, settings, resume=resume)
     else:
         with PartialRun(out, settings, resume=resume) as partial:
-            rig = rig or settings.environment.rig()
-            outcomes = _fill(partial, settings, workers=workers, rig=rig, show_progress=show_progress)
+            outcomes = _fill(partial, settings, workers=workers, show_progress=show_progress)
             partial.dataset.rename(out)
     PartialRun.remove(out)
     return DemonstrationSummary(
         out=out,
         episodes=sum(outcome["kept"] for outcome in outcomes),
         failures=[outcome["pair_uid"] for outcome in outcomes if not outcome["success"]],
-        simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.fps,
+        simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.env.fps,
         wall_s=time.monotonic() - start,
     )
 
@@ -100,12 +96,12 @@ def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: boo
 
 
 def _fill(
-    partial: PartialRun, settings: DemonstrationSettings, *, workers: int, rig: Rig, show_progress: bool
+    partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool
 ) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
     pairs = settings.pairs()
     with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:
-        futures = {pair: _start(pool, progress, rig, settings, pair, partial.episodes) for pair in pairs}
+        futures = {pair: _start(pool, progress, settings, pair, partial.episodes) for pair in pairs}
         # LeRobot takes seconds to load; by now the workers are at work.
         from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
 
@@ -119,8 +115,8 @@ def _fill(
     if not any(outcome["kept"] for outcome in outcomes):
         raise DatasetError(
             f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; "
-            f"to look at them, remove {partial.folder} and record again with --keep-failures "
-            "(the time limit is --episode-length)"
+            f"to look at them, remove {partial.folder} and record again with --keep_failures=true "
+            "(the time limit is --env.episode_length)"
         )
     dataset.finalize()
     shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
@@ -132,7 +128,6 @@ def _fill(
 def _start(
     pool: Executor,
     progress: EpisodeProgress,
-    rig: Rig,
     settings: DemonstrationSettings,
     pair: Pair,
     folder: Path,
@@ -144,4 +139,4 @@ def _start(
         future: Future[Outcome] = Future()
         future.set_result(finished)
         return future
-    return submit_episode(pool, progress, simulate_episode, rig, settings, pair, folder)
+    return submit_episode(pool, progress, simulate_episode, settings, pair, folder)

@@ -2,39 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
-
-
-class Environment(Protocol):
-    """What an episode needs of an environment."""
-
-    task_description: str
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start an episode."""
-
-    def step(self, action: NDArray[Any]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Advance by one frame."""
-
-    def close(self) -> None:
-        """Free what the environment holds."""
-
-
-class Operator(Protocol):
-    """What an episode needs of an operator."""
-
-    def reset(self, env: Any) -> None:
-        """Look at a freshly reset environment."""
-
-    def act(self, env: Any) -> NDArray[Any]:
-        """Return the next action, float32 (a,)."""
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.selection import Schedule
+from lerobot_excav.envs.tasks.task import Operator
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +18,15 @@ class Episode:
     """What was seen and done, frame by frame; everything is taken just before the frame's action.
 
     Attributes:
-        pair: Scene and target.
+        pair: Scene and the target that is commanded first.
         task: Task description.
         images: By camera, (n, H, W, 3) uint8; empty when the environment shows none.
         state: What the policy feels of the machine, (n, s) float32; names and units as its environment has them.
         action: What it was told, (n, a) float32.
+        target_id: Target that is commanded, (n,) int64.
         task_state: How far the task is, (n, k) float32.
         success: Outcome of the episode.
+        mask_missing: Whether the episode was given up because no mask was found.
         metrics: Outcome part by part, after the last action.
     """
 
@@ -57,8 +35,10 @@ class Episode:
     images: dict[str, NDArray[Any]]
     state: NDArray[Any]
     action: NDArray[Any]
+    target_id: NDArray[Any]
     task_state: NDArray[Any]
     success: bool
+    mask_missing: bool
     metrics: dict[str, Any]
 
     @property
@@ -67,7 +47,7 @@ class Episode:
         return len(self.action)
 
 
-def demonstrate(env: Environment, operator: Operator, pair: Pair) -> Episode:
+def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) -> Episode:
     """Let an operator play an episode to its end.
 
     Args:
@@ -75,33 +55,37 @@ def demonstrate(env: Environment, operator: Operator, pair: Pair) -> Episode:
         operator: Operator; it is reset once the environment is.
         pair: Scene and target.
     """
-    return _play(env, pair, reset=lambda: operator.reset(env), act=lambda _: operator.act(env))
+    options = {"scene_id": pair.scene_id, "target_id": pair.target_id}
+    return _play(env, pair, options, reset=lambda: operator.reset(env), act=lambda _: operator.act(env))
 
 
-def replay(env: Environment, action: NDArray[Any], pair: Pair) -> Episode:
+def replay(env: MaskedTaskEnv[Any, Any], action: NDArray[Any], pair: Pair, schedule: Schedule) -> Episode:
     """Play recorded actions again, all of them: a person may go on after the environment says that it is over.
 
     Args:
         env: Environment; it is reset to the pair's scene and target.
         action: Actions, (n, a) float32.
         pair: Scene and target.
+        schedule: Changes of the command.
 
     Returns:
         The episode. Its `metrics` are empty unless the environment said that it is over.
     """
-    return _play(env, pair, reset=lambda: None, act=lambda frame: action[frame], length=len(action))
+    options = {"scene_id": pair.scene_id, "target_id": pair.target_id, "commands": schedule}
+    return _play(env, pair, options, reset=lambda: None, act=lambda frame: action[frame], length=len(action))
 
 
 def _play(
-    env: Environment,
+    env: MaskedTaskEnv[Any, Any],
     pair: Pair,
+    options: dict[str, Any],
     *,
     reset: Callable[[], None],
     act: Callable[[int], NDArray[Any]],
     length: int | None = None,
 ) -> Episode:
     """Play `length` frames, or by default until the episode ends."""
-    observation, info = env.reset(options={"scene_id": pair.scene_id, "target_id": pair.target_id})
+    observation, info = env.reset(options=options)
     reset()
     frames: list[dict[str, Any]] = []
     metrics: dict[str, Any] = {}
@@ -120,6 +104,7 @@ def _play(
         task=env.task_description,
         images={camera: columns.pop(camera) for camera in cameras},
         success=success,
+        mask_missing=bool(info["mask_missing"]),
         metrics=dict(metrics),
         **columns,
     )
@@ -130,5 +115,6 @@ def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[An
         **observation.get("pixels", {}),
         "state": np.asarray(observation["agent_pos"], dtype=np.float32),
         "action": action,
+        "target_id": np.int64(info["target_id"]),
         "task_state": np.asarray(info["task_state"], dtype=np.float32),
     }

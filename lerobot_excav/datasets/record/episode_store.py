@@ -47,6 +47,7 @@ class EpisodeStore:
             "success": episode.success,
             "frames": episode.length,
             "kept": keep_frames,
+            "mask_missing": episode.mask_missing,
             "metrics": episode.metrics,
         }
         if keep_frames:
@@ -75,8 +76,10 @@ class EpisodeStore:
             images={camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras},
             state=arrays["state"],
             action=arrays["action"],
+            target_id=arrays["target_id"],
             task_state=arrays["task_state"],
             success=bool(outcome["success"]),
+            mask_missing=bool(outcome["mask_missing"]),
             metrics=outcome["metrics"],
         )
 
@@ -89,6 +92,7 @@ def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
         "task": np.array(episode.task),
         "state": episode.state,
         "action": episode.action,
+        "target_id": episode.target_id,
         "task_state": episode.task_state,
     }
     for camera, frames in episode.images.items():

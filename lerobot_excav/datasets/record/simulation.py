@@ -3,24 +3,26 @@
 Workers load this module and what it imports; LeRobot, which takes seconds and a gigabyte per process, is not among it.
 """
 
-from functools import lru_cache
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lerobot_excav.datasets.format.pair import Pair
-from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.episode import Environment, Episode, demonstrate
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
+from lerobot_excav.datasets.record.episode import Episode, demonstrate
 from lerobot_excav.datasets.record.episode_store import EpisodeStore
-from lerobot_excav.datasets.record.rig import Rig
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
 
 
-def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, folder: Path) -> dict[str, Any]:
+def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> dict[str, Any]:
     """Play one episode and store it; runs in a worker.
 
     Args:
-        rig: Environment and operator.
         settings: What is being recorded.
         pair: Scene and target.
         folder: Folder of finished episodes.
@@ -28,20 +30,61 @@ def simulate_episode(rig: Rig, settings: DemonstrationSettings, pair: Pair, fold
     Returns:
         Outcome of the episode.
     """
-    episode = play_demonstration(rig, settings, pair)
-    return EpisodeStore(folder).write(episode, keep_frames=episode.success or settings.keep_failures)
+    episode = play_demonstration(settings, pair)
+    # An episode without a mask would teach a policy to work without a command.
+    keep = (episode.success or settings.keep_failures) and not episode.mask_missing
+    return EpisodeStore(folder).write(episode, keep_frames=keep)
 
 
-def play_demonstration(rig: Rig, settings: DemonstrationSettings, pair: Pair) -> Episode:
-    """Play one episode with the rig's operator; the same arguments give the same episode.
+def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = True) -> Episode:
+    """Play one episode with the scripted operator; the same arguments give the same episode.
 
-    The environment stays open for the next call with the same rig and settings.
+    The environment stays open for the next call with the same settings.
+
+    Args:
+        played: What is played.
+        pair: Scene and target.
+        with_images: Whether the environment draws pictures; without them it is several times faster.
     """
-    env = _environment(rig, settings)
-    operator = rig.operator(np.random.default_rng(settings.episode_seed(pair)))
+    env = _open_environment(played.env, with_images=with_images)
+    operator = played.task_spec.make_operator(np.random.default_rng(played.episode_seed(pair)))
     return demonstrate(env, operator, pair)
 
 
-@lru_cache(maxsize=1)
-def _environment(rig: Rig, settings: DemonstrationSettings) -> Environment:
-    return rig.environment(settings)
+def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
+    """Make the environment of some settings, with pictures or without."""
+    return task_of_settings(settings).make_env(
+        obs_type="pixels_agent_pos" if with_images else "agent_pos",
+        render_mode="rgb_array" if with_images else None,
+        **settings.as_dict(),
+    )
+
+
+def make_replay_environment(
+    spec: TaskSpec, *, scene_set: str, fps: int, columns: Mapping[str, str], frames: int
+) -> MaskedTaskEnv[Any, Any]:
+    """Make the environment in which a recorded episode is played again, without pictures and with its own commands.
+
+    Args:
+        spec: The task.
+        scene_set: Scene set.
+        fps: Frames per second.
+        columns: Settings that datasets keep in every frame, by name.
+        frames: Length of the recording.
+    """
+    settings = spec.make_settings(
+        scene_set=scene_set, fps=fps, episode_length=spec.replay_length(frames), **columns
+    )
+    return make_environment(settings, with_images=False)
+
+
+_open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []
+
+
+def _open_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
+    """Return the environment of the last call if it was the same one; to open a graphics context is slow."""
+    if not _open or _open[0][:2] != (settings, with_images):
+        for *_, env in _open:
+            env.close()
+        _open[:] = [(settings, with_images, make_environment(settings, with_images=with_images))]
+    return _open[0][2]

@@ -1,28 +1,16 @@
 """Which targets a scene is shown with."""
 
 from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, TARGETS_PER_SCENE
+from lerobot_excav.errors import require_choice
 
-TargetRule = Literal["round", "uniform", "nearest"]
-TARGET_RULES: tuple[TargetRule, ...] = ("round", "uniform", "nearest")
+TARGET_RULES = ("round", "uniform", "nearest")
 
 # Keeps the draws apart from those of the operator, whose generators have the same seed.
 _STREAM = 0x7A26
-
-
-def targets_in_turn(scene_id: int, count: int) -> list[int]:
-    """Return `count` targets of a scene, going round them from scene to scene, so that all are equally frequent."""
-    return sorted((scene_id + k) % TARGETS_PER_SCENE for k in range(count))
-
-
-def target_by_lot(seed: int, scene_set: str, scene_id: int) -> int:
-    """Draw one target of a scene; a scene's draw does not depend on which other scenes are drawn for."""
-    rng = np.random.default_rng((_STREAM, seed, SCENE_SETS.index(scene_set), scene_id))
-    return int(rng.integers(TARGETS_PER_SCENE))
 
 
 def targets_of_scene(
@@ -32,20 +20,26 @@ def targets_of_scene(
     seed: int,
     scene_set: str,
     scene_id: int,
-    nearest: Callable[[str, int], int] | None,
+    nearest: Callable[[str, int], int],
 ) -> list[int]:
     """Return the targets that a scene is shown with.
 
     Args:
-        rule: `round`, `uniform` or `nearest`.
+        rule: `round` goes round the targets from scene to scene, so that all are equally frequent; `uniform` draws one,
+            whatever other scenes are drawn for; `nearest` takes that one.
         count: How many; the latter two choose one.
         seed: Seed of `uniform`.
         scene_set: Scene set.
         scene_id: Scene.
         nearest: Returns the nearest target of a scene.
+
+    Raises:
+        ConfigurationError: There is no such rule.
     """
+    require_choice("target_rule", rule, TARGET_RULES)
     if rule == "uniform":
-        return [target_by_lot(seed, scene_set, scene_id)]
-    if rule == "nearest" and nearest is not None:
+        rng = np.random.default_rng((_STREAM, seed, SCENE_SETS.index(scene_set), scene_id))
+        return [int(rng.integers(TARGETS_PER_SCENE))]
+    if rule == "nearest":
         return [nearest(scene_set, scene_id)]
-    return targets_in_turn(scene_id, count)
+    return sorted((scene_id + k) % TARGETS_PER_SCENE for k in range(count))

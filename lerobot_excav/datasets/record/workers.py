@@ -91,7 +91,7 @@ def episode_result(pair: Pair, future: Future[dict[str, Any]]) -> dict[str, Any]
         return future.result()
     except BrokenProcessPool as error:
         raise ExcavError(
-            "a worker process died (out of memory?); go on with --resume, perhaps with fewer --workers"
+            "a worker process died (out of memory?); go on with --resume=true, perhaps with fewer --workers"
         ) from error
     except ExcavError as error:
         raise ExcavError(f"{pair.uid}: {error}") from error

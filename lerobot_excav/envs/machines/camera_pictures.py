@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.offscreen import create_context
+from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
 from lerobot_excav.errors import RenderingError, require, require_choice
 
 
@@ -73,7 +74,19 @@ class CameraPictures:
 
     def points_w(self, camera: str, options: Any) -> NDArray[np.float64]:
         """Return the point behind every pixel (H, W, 3) [m], world frame."""
-        return self._unproject(camera, self.distance_m(camera, options))
+        return self.pinhole(camera).points_w(self.distance_m(camera, options))
+
+    def pinhole(self, camera: str) -> PinholeCamera:
+        """Return where a camera stands now, and how it projects."""
+        require_choice("camera", camera, self._cameras)
+        index = self._model.camera(camera).id
+        return PinholeCamera(
+            position_w=np.array(self._data.cam_xpos[index]),
+            axes_w=np.array(self._data.cam_xmat[index].reshape(3, 3)),
+            fovy_rad=float(np.radians(self._model.cam_fovy[index])),
+            height=self._height,
+            width=self._width,
+        )
 
     def geoms(self, camera: str, options: Any) -> NDArray[np.int64]:
         """Return the index in the model of the geom that every pixel shows (H, W); -1 where none is."""
@@ -138,17 +151,6 @@ class CameraPictures:
         mujoco.mjr_readPixels(image, None, self._viewport, self._mjr)
         return image[::-1].copy()
 
-    def _unproject(self, camera: str, distance_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the world points (H, W, 3) at given distances along the optical axis."""
-        index = self._model.camera(camera).id
-        focal_px = 0.5 * self._height / np.tan(0.5 * np.radians(self._model.cam_fovy[index]))
-        row, column = np.indices(distance_m.shape)
-        right = (column + 0.5 - 0.5 * self._width) / focal_px
-        up = (0.5 * self._height - row - 0.5) / focal_px
-        rays = np.stack([right, up, -np.ones_like(right)], axis=-1)
-        axes = self._data.cam_xmat[index].reshape(3, 3)
-        return np.asarray(self._data.cam_xpos[index] + (distance_m[..., None] * rays) @ axes.T)
-
 
 def visible_groups(*groups: int) -> Any:
     """Return drawing options that show some groups of geoms, skins and tendons and nothing else."""
@@ -158,3 +160,10 @@ def visible_groups(*groups: int) -> Any:
         shown[list(groups)] = 1
     options.sitegroup[:] = 0
     return options
+
+
+def add_camera(body: mujoco.MjsBody, name: str, pose: CameraPose) -> None:
+    """Add a camera to a body of a model."""
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, pose.axes.ravel())
+    body.add_camera(name=name, pos=list(pose.position), quat=quat.tolist(), fovy=pose.fovy_deg)

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ from lerobot_excav.envs.soil.tool import Tool
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pose:
+class Pose(NamedTuple):
     """Position (3,) [m] with z above the rigid floor, and rotation (3, 3), as writable arrays for kernels."""
 
     position: Array
@@ -27,11 +26,6 @@ class Pose:
         return cls(
             position=tool.position_w + np.array([0.0, 0.0, floor_depth_m]), rotation=np.array(tool.rotation_w)
         )
-
-    @property
-    def arrays(self) -> tuple[Array, Array]:
-        """Return position and rotation in the form that kernels take."""
-        return self.position, self.rotation
 
     def place(self, points_t: Array) -> Array:
         """Turn (n, 3) tool points into world points [m]."""

@@ -5,12 +5,9 @@ from dataclasses import dataclass
 
 from lerobot_excav.errors import require
 
-GRAVITY_M_S2 = 9.81
-"""Standard gravity, rounded as the references round it."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Provenance:
+class Origin:
     """Where a number comes from: its unit, its source and its kind (paper, datasheet, derived, tuned, guess)."""
 
     unit: str
@@ -20,7 +17,7 @@ class Provenance:
 
 @dataclass(frozen=True, kw_only=True)
 class SoilParameters:
-    """Bulk properties of one soil; `PROVENANCE` has the source of each.
+    """Bulk properties of one soil; `ORIGINS` has the source of each.
 
     Attributes:
         density_kg_m3: Bulk density, on the ground as in the air.
@@ -83,26 +80,26 @@ _ALLOWED = (
 
 _AGX = "Algoryx AGX Terrain material presets (AGXUnreal assets, Apache-2.0), values re-typed"
 
-PROVENANCE = {
-    "density_kg_m3": Provenance(unit="kg/m3", source=_AGX, kind="paper"),
-    "friction_angle_rad": Provenance(unit="rad", source=_AGX, kind="paper"),
-    "cohesion_pa": Provenance(unit="Pa", source=_AGX, kind="paper"),
-    "swell": Provenance(unit="1", source=_AGX, kind="paper"),
-    "steel_friction_angle_rad": Provenance(
+ORIGINS = {
+    "density_kg_m3": Origin(unit="kg/m3", source=_AGX, kind="paper"),
+    "friction_angle_rad": Origin(unit="rad", source=_AGX, kind="paper"),
+    "cohesion_pa": Origin(unit="Pa", source=_AGX, kind="paper"),
+    "swell": Origin(unit="1", source=_AGX, kind="paper"),
+    "steel_friction_angle_rad": Origin(
         unit="rad", source="2/3 of the friction angle, McKyes 1985", kind="derived"
     ),
-    "parcel_solid_fraction": Provenance(
+    "parcel_solid_fraction": Origin(
         unit="1", source="parcels poured gently into a bucket pack to 0.56", kind="tuned"
     ),
-    "parcel_sliding_scale": Provenance(
+    "parcel_sliding_scale": Origin(
         unit="1", source="0.5 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
     ),
-    "parcel_rolling_scale": Provenance(
+    "parcel_rolling_scale": Origin(
         unit="1", source="0.3 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
     ),
-    "ground_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "ground_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "penetration_scale": Provenance(unit="1", source="bearing theory as it is", kind="guess"),
+    "ground_sliding_scale": Origin(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
+    "ground_rolling_scale": Origin(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
+    "penetration_scale": Origin(unit="1", source="bearing theory as it is", kind="guess"),
 }
 """Source of each field of `SoilParameters`."""
 

@@ -5,13 +5,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.bucket import Bucket
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
-from lerobot_excav.envs.soil.forces import DiggingResistance
+from lerobot_excav.envs.soil.forces import SoilResistance
 from lerobot_excav.envs.soil.height_field import HeightField
-from lerobot_excav.envs.soil.loose import TICK_S, LooseSoil
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, PRESETS, SoilParameters
+from lerobot_excav.envs.soil.loose import LooseSoil
+from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.tool import Reaction, Tool
 from lerobot_excav.errors import require, require_choice
 
@@ -91,7 +92,7 @@ class Soil:
         self._loose = LooseSoil(
             self.parameters, self.fidelity, self._field, self._box_field, container, self.floor_depth_m
         )
-        self._resistance = DiggingResistance(self.parameters, self.fidelity.force_slices)
+        self._resistance = SoilResistance(self.parameters, self.fidelity.force_slices)
         self.reset()
 
     def reset(self, heights_m: ArrayLike | None = None) -> None:
@@ -136,7 +137,7 @@ class Soil:
         masses = np.full(len(positions), self.parcel_mass_kg)
         self._loose.population.add(positions, velocities, masses)
 
-    def step(self, dt_s: float = 0.02, tool: Tool | None = None) -> Reaction:
+    def step(self, dt_s: float = TICK_S, tool: Tool | None = None) -> Reaction:
         """Advance by one step.
 
         Args:

@@ -1,4 +1,4 @@
-"""What both environments show, and how: pictures under `pixels`, joints under `agent_pos`."""
+"""What every environment shows, and how: pictures under `pixels`, joints under `agent_pos`."""
 
 from collections.abc import Sequence
 from typing import Any

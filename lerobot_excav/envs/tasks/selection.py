@@ -1,31 +1,48 @@
-"""Which scene and target an episode plays: from options, else seed, else by chance."""
+"""What an episode plays: scene, target and changes of the command, from options, else seed, else by chance."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lerobot_excav.envs.tasks.settings import require_integer
-from lerobot_excav.errors import require_choice
+from lerobot_excav.errors import require, require_choice, require_integer
 
-RESET_OPTIONS = ("scene_id", "target_id")
+RESET_OPTIONS = ("scene_id", "target_id", "commands")
+
+Schedule = tuple[tuple[int, int], ...]
+"""Changes of the command: after how many actions which target is commanded."""
 
 
-def select_scene_and_target(
-    seed: int | None, options: dict[str, Any], *, rng: np.random.Generator, target_count: int
-) -> tuple[int, int]:
-    """Choose scene and target of an episode.
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """What an episode plays.
+
+    Attributes:
+        scene_id: Scene.
+        target_id: Target that is commanded at the start.
+        schedule: Changes of the command; None leaves them to the task.
+    """
+
+    scene_id: int
+    target_id: int
+    schedule: Schedule | None = None
+
+
+def select_episode(
+    seed: int | None, options: Mapping[str, Any], *, rng: np.random.Generator, target_count: int
+) -> Selection:
+    """Choose scene, target and changes of the command.
 
     Args:
         seed: Seed of the reset; without options it is the scene, and its remainder the target.
-        options: May hold `scene_id` and `target_id`, and LeRobot's own keys, which begin with `lerobot_`.
+        options: May hold `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of
+            actions carried out before and the target), and LeRobot's own keys, which begin with `lerobot_`.
         rng: Source of the scene when neither is given.
         target_count: Targets of a scene.
 
-    Returns:
-        Scene and target.
-
     Raises:
-        ConfigurationError: `scene_id` or `target_id` is no integer or out of range, or an option is unknown.
+        ConfigurationError: A value is not a whole number or out of range, or an option is unknown.
     """
     for key in options:
         if not key.startswith("lerobot_"):
@@ -35,4 +52,24 @@ def select_scene_and_target(
     require_integer("scene_id", scene_id, 0, 2**63 - 1)
     target_id = options.get("target_id", scene_id % target_count)
     require_integer("target_id", target_id, 0, target_count - 1)
-    return int(scene_id), int(target_id)
+    commands = options.get("commands")
+    schedule = None if commands is None else checked_schedule(commands, target_count)
+    return Selection(scene_id=int(scene_id), target_id=int(target_id), schedule=schedule)
+
+
+def checked_schedule(commands: Sequence[Sequence[int]], target_count: int) -> Schedule:
+    """Return changes of the command as whole numbers.
+
+    Raises:
+        ConfigurationError: A frame is below 1 or not after the one before, or a target does not exist.
+    """
+    last = 0
+    for change in commands:
+        require(len(change) == 2, f"commands={commands!r}: {change!r} is not a pair of frame and target")
+        frame, target_id = change
+        require_integer(
+            "commands: frame", frame, last + 1, hint="Frames are numbered from the start and rise."
+        )
+        require_integer("commands: target_id", target_id, 0, target_count - 1)
+        last = frame
+    return tuple((int(frame), int(target_id)) for frame, target_id in commands)

@@ -94,7 +94,7 @@ def torchvision_resnet(config: MaskACTConfig, norm: type[nn.Module]) -> tuple[nn
     )
     feature_count = resnet.fc.in_features
     resnet.conv1 = with_mask_channel(resnet.conv1)
-    # A ResNet's children run in their order of definition; the last two, pooling and classifier, stay behind.
+    # A ResNet's children run in their order of definition; the last two, pooling and classifier, are left out.
     return nn.Sequential(OrderedDict(list(resnet.named_children())[:-2])), feature_count
 
 

@@ -21,7 +21,7 @@ TARGET_MASK_KEY = "observation.images.target_mask"
 def resolved[T](value: T | None) -> T:
     """Return a setting that `MaskACTConfig` has filled in; None means the configuration was tampered with."""
     if value is None:
-        raise ConfigurationError("a setting of mask_act is None; build the configuration anew from a preset.")
+        raise ConfigurationError("a setting of mask_act is None; build a new configuration from a preset.")
     return value
 
 
@@ -172,8 +172,8 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     def validate_features(self) -> None:
         """Check the image features against each other.
 
-        A missing mask is no error here, because LeRobot also builds policies for features that are not final;
-        `set_dataset_feature_metadata` refuses a dataset without one, `views` refuses such a batch.
+        A missing mask is accepted here, because LeRobot also builds policies for features that are not final.
+        `set_dataset_feature_metadata` refuses a dataset without a mask, `views` refuses such a batch.
 
         Raises:
             ConfigurationError: No camera, an unknown main camera, a camera that is not RGB, or a mask whose size is
@@ -197,14 +197,14 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             )
         mask = self.image_features.get(self.mask_key)
         if mask is not None:
-            main_size = tuple(self.image_features[self.main_camera_key].shape[1:])
-            require_mask_size(self.mask_key, tuple(mask.shape[1:]), self.main_camera_key, main_size)
+            main_shape = tuple(self.image_features[self.main_camera_key].shape)
+            require_mask_shape(self.mask_key, tuple(mask.shape), self.main_camera_key, main_shape)
 
     def set_dataset_feature_metadata(self, features: dict[str, Any]) -> None:
         """Refuse a dataset without masks before anything is built; LeRobot calls this hook.
 
-        A policy from a checkpoint is let through: its dataset may be renamed by `--rename_map`, which this hook does
-        not see. `views` checks what arrives.
+        A policy from a checkpoint is accepted: `--rename_map` may rename the features of its dataset, and this hook
+        does not see that. `views` checks what arrives.
 
         Args:
             features: Feature descriptions of the dataset, `dtype` and `shape` among them.
@@ -237,23 +237,15 @@ MISSING_MASK_HINT = (
 )
 
 
-def require_mask_size(
-    mask_key: str, mask_size: tuple[int, ...], main_key: str, main_size: tuple[int, ...]
+def require_mask_shape(
+    mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]
 ) -> None:
-    """Raise unless mask and main camera have the same height and width.
-
-    Args:
-        mask_key: Feature of the mask.
-        mask_size: Its (height, width).
-        main_key: Feature of the main camera.
-        main_size: Its (height, width).
-
-    Raises:
-        ConfigurationError: The sizes differ.
-    """
+    """Raise `ConfigurationError` unless the shape of a mask fits its camera: ([B,] 1 or 3, H, W) to ([B,] 3, H, W)."""
+    *batch, _, height, width = main_shape
+    allowed = [(*batch, channels, height, width) for channels in (1, 3)]
     require(
-        mask_size == main_size,
-        f"{mask_key} is {mask_size[0]} x {mask_size[1]} (height x width), {main_key} is {main_size[0]} x "
-        f"{main_size[1]}; a mask marks pixels of its camera, so they must be equal. Render both at one size, or set "
+        mask_shape in allowed,
+        f"{mask_key} has shape {mask_shape}, {main_key} has shape {main_shape}; a mask marks pixels of its camera, so "
+        f"its shape must be {allowed[0]} or {allowed[1]} (channels, height, width). Render both at one size, or set "
         "--policy.main_camera to the camera that the mask belongs to.",
     )

@@ -24,7 +24,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Parameters are stored in half precision (float16: 11 significant bits) and load into a float32 network as usual;
     running statistics stay in float32, they are few and small. The encoder of the variational latent, the optimizer
-    and the training settings, with their local paths, stay behind. `use_vae` is false in the copy, so nothing is
+    and the training settings with their local paths are left out. `use_vae` is false in the copy, so nothing is
     missing when it is loaded; fine-tuning it trains without a latent.
 
     Args:
@@ -36,8 +36,8 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
         The folder written: `config.json`, `model.safetensors`, the processors, `README.md`.
 
     Raises:
-        ConfigurationError: The folder is no checkpoint of `mask_act`, is the one to write, or holds a weight beyond
-            half precision.
+        ConfigurationError: The folder does not hold a checkpoint of `mask_act`, is the one to write, or holds a
+            weight beyond half precision.
     """
     require_checkpoint(checkpoint)
     require(
@@ -54,7 +54,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
     for pattern in PROCESSORS:
         for file in sorted(checkpoint.glob(pattern)):
             shutil.copyfile(file, out / file.name)
-    (out / CARD).write_text(card)
+    card.save(out / CARD)
     return out
 
 
@@ -100,7 +100,7 @@ def require_checkpoint(checkpoint: Path) -> None:
     missing = [name for name in (CONFIG, WEIGHTS) if not (checkpoint / name).is_file()]
     require(
         not missing,
-        f"checkpoint={checkpoint} has no {' and no '.join(missing)}; give the pretrained_model folder of a run of "
+        f"checkpoint={checkpoint} lacks {' and '.join(missing)}; give the pretrained_model folder of a run of "
         "lerobot-train, for example outputs/train/checkpoints/last/pretrained_model.",
     )
     config = PreTrainedConfig.from_pretrained(checkpoint)

@@ -96,7 +96,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         """
         require_choice("reduction", reduction, ("mean", "none"))
         demonstration = Demonstration(actions=batch[ACTION], is_pad=batch["action_is_pad"])
-        actions, latent = self._run(batch, demonstration if self.training else None)
+        mask = target_mask(self.config, batch, is_training=True)
+        actions, latent = self._run(batch, mask, demonstration if self.training else None)
         error = F.l1_loss(actions, demonstration.actions, reduction="none").mean(dim=-1)  # (B, chunk_size)
         valid = ~demonstration.is_pad
         if reduction == "mean":
@@ -112,24 +113,28 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
     @torch.no_grad()
     def predict_action_chunk(self, batch: Batch, **kwargs: Any) -> Tensor:
-        """Return a plan for each environment: normalised actions, shape (B, chunk_size, A)."""
+        """Return a plan for each environment: normalised actions, shape (B, chunk_size, A).
+
+        Raises:
+            ConfigurationError: The observations do not fit the policy, or the mask is not binary.
+        """
         self.eval()
-        return self._run(batch, None)[0]
+        return self._run(batch, target_mask(self.config, batch), None)[0]
 
     @torch.no_grad()
     def select_action(self, batch: Batch, **kwargs: Any) -> Tensor:
         """Return the next action of each environment, shape (B, A), normalised.
 
-        An environment is planned for when its plan has run out or its mask has changed. The plans of the other
-        environments go on undisturbed.
+        An environment gets a new plan when its plan has run out or its mask has changed. The other environments keep
+        their plans.
 
         Args:
             batch: Observations of all environments.
             **kwargs: Accepted for LeRobot's interface, without effect.
 
         Raises:
-            ConfigurationError: The observations do not fit the policy, or the number of environments changed
-                without `reset`.
+            ConfigurationError: The observations do not fit the policy, the mask is not binary, or the number of
+                environments changed without `reset`.
         """
         self.eval()
         changed = self._watch.changed(target_mask(self.config, batch))
@@ -140,8 +145,9 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
             self._queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
         return self._queue.pop()
 
-    def _run(self, batch: Batch, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
-        mask = target_mask(self.config, batch)
+    def _run(
+        self, batch: Batch, mask: Tensor, demonstration: Demonstration | None
+    ) -> tuple[Tensor, Latent | None]:
         plan: tuple[Tensor, Latent | None] = self.model(
             masked_views(self.config, batch, mask),
             mask,

@@ -13,17 +13,17 @@ class TargetWatch:
         self._mask: Tensor | None = None
 
     def reset(self) -> None:
-        """Forget the masks; the next ones are first sights."""
+        """Forget the masks; the next ones count as changed."""
         self._mask = None
 
     def changed(self, mask: Tensor) -> Tensor:
-        """Return where the mask is new, and remember it.
+        """Return where the mask has changed, and remember it.
 
         Args:
             mask: Target masks, 0 or 1, shape (B, 1, H, W).
 
         Returns:
-            True for each environment whose mask differs from the last one seen, or that is seen first; shape (B,).
+            True for each environment whose mask differs from the last one, or that had none before; shape (B,).
 
         Raises:
             ConfigurationError: The batch has another size than at the last step.
@@ -94,7 +94,7 @@ class TemporalEnsemble:
     """Average of all plans for the same moment (arXiv:2304.13705, algorithm 2), with one memory per environment.
 
     The i-th plan for a moment, the oldest being i = 0, has weight exp(-coefficient i). With no change of target this
-    is LeRobot's `ACTTemporalEnsembler`; a change starts that environment's average anew.
+    is LeRobot's `ACTTemporalEnsembler`; a change starts a new average for that environment.
 
     Args:
         coefficient: Decay of the weights; positive favours older plans, negative newer ones.

@@ -1,6 +1,6 @@
 """Named sets of network and training settings.
 
-A preset fills the fields of `MaskACTConfig` that were left at None; whatever is set by hand wins.
+A preset fills the fields of `MaskACTConfig` that were left at None. A value that is set by hand wins.
 """
 
 from typing import Any

@@ -9,24 +9,26 @@ from lerobot_excav.errors import require
 from lerobot_excav.policies.mask_act.configuration_mask_act import (
     MISSING_MASK_HINT,
     MaskACTConfig,
-    require_mask_size,
+    require_mask_shape,
 )
 
 Batch = dict[str, Any]
 
 
-def target_mask(config: MaskACTConfig, batch: Batch) -> Tensor:
+def target_mask(config: MaskACTConfig, batch: Batch, *, is_training: bool = False) -> Tensor:
     """Return the binary target mask, the only place where the policy reads it.
 
     Args:
-        config: Settings of the policy; with `withhold_mask` the mask is zero whatever the batch holds.
-        batch: Observations: the mask in [0, 1] or {0, 255}, shape (B, 1 or 3, H, W), and the main camera.
+        config: Settings of the policy; with `withhold_mask` the mask is zero and the batch needs none.
+        batch: Observations: the mask, shape (B, 1 or 3, H, W), and the main camera.
+        is_training: Whether the mask may come from a lossy video, which moves its values: it is cut at one half.
+            Otherwise it must hold 0 and 1 only, or 0 and 255.
 
     Returns:
         Mask, 0 or 1, float, shape (B, 1, H, W).
 
     Raises:
-        ConfigurationError: The batch has no main camera or no mask, or their sizes differ.
+        ConfigurationError: The batch has no main camera or no mask, their sizes differ, or the mask is not binary.
     """
     require_cameras(config, batch)
     main: Tensor = batch[config.main_camera_key]
@@ -37,18 +39,24 @@ def target_mask(config: MaskACTConfig, batch: Batch) -> Tensor:
         f"the observations have no {config.mask_key!r}; they have {image_keys(batch)}. {MISSING_MASK_HINT}",
     )
     mask: Tensor = batch[config.mask_key]
-    require_mask_size(config.mask_key, tuple(mask.shape[-2:]), config.main_camera_key, tuple(main.shape[-2:]))
-    # A mask stored in three equal channels is read from the first; lossy videos move its values, not its half.
-    return (mask[:, :1] > 0.5).to(main.dtype)
+    require_mask_shape(config.mask_key, tuple(mask.shape), config.main_camera_key, tuple(main.shape))
+    if not is_training:
+        require_binary(config.mask_key, mask)
+    return (mask[:, :1] > 0.5).to(main.dtype)  # of three equal channels the first
+
+
+def require_binary(mask_key: str, mask: Tensor) -> None:
+    """Raise `ConfigurationError` unless a mask holds 0 and 1 only, or 0 and 255. All zeros are a mask, too."""
+    others = mask[(mask != 0) & (mask != 1) & (mask != 255)]
+    require(
+        others.numel() == 0,
+        f"{mask_key} holds values such as {others[:1].tolist()} and is not binary; allowed: 0 outside the target and 1 "
+        "(or 255) on it. If these are probabilities or a lossy video, pass mask > 0.5.",
+    )
 
 
 def masked_views(config: MaskACTConfig, batch: Batch, mask: Tensor) -> list[Tensor]:
     """Join the mask to the main camera and zeros to every other camera.
-
-    Args:
-        config: Settings of the policy.
-        batch: Observations with every camera of the policy, each (B, 3, H, W).
-        mask: Target mask, shape (B, 1, H, W).
 
     Returns:
         One (B, 4, H, W) tensor per camera, in the order of `config.camera_keys`.
@@ -62,15 +70,7 @@ def masked_views(config: MaskACTConfig, batch: Batch, mask: Tensor) -> list[Tens
 
 
 def require_cameras(config: MaskACTConfig, batch: Batch) -> None:
-    """Raise unless the batch holds every camera of the policy at the size it was built for.
-
-    Args:
-        config: Settings of the policy.
-        batch: Observations.
-
-    Raises:
-        ConfigurationError: A camera is missing or has another size; the message names both sides.
-    """
+    """Raise `ConfigurationError` unless a batch holds every camera of the policy at the size it was built for."""
     given = [key for key in image_keys(batch) if key != config.mask_key]
     missing = [key for key in config.camera_keys if key not in batch]
     require(

@@ -8,23 +8,11 @@ from lerobot_excav.errors import require, require_choice
 from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PATTERNS
 
 BUTTONS = (
-    "a",
-    "b",
-    "x",
-    "y",
-    "back",
-    "guide",
-    "start",
-    "leftstick",
-    "rightstick",
-    "leftshoulder",
-    "rightshoulder",
-    "dpad_up",
-    "dpad_down",
-    "dpad_left",
-    "dpad_right",
+    *("a", "b", "x", "y", "back", "guide", "start"),
+    *("leftstick", "rightstick", "leftshoulder", "rightshoulder"),
+    *("dpad_up", "dpad_down", "dpad_left", "dpad_right"),
 )
-"""Buttons of a gamepad, by the names that SDL gives them whatever is printed on them."""
+"""Buttons of a gamepad, by the names that SDL gives them; other names may be printed on the device."""
 
 
 @TeleoperatorConfig.register_subclass("excavator_joystick")
@@ -40,7 +28,7 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
         expo: From 0, a straight response, to 1, the finest control near the centre.
         invert: Axes to turn around, out of `left_x`, `left_y`, `right_x`, `right_y`.
         reinitialise_button: Button that restarts the scene.
-        next_scene_button: Button that goes on to the next target or scene.
+        next_scene_button: Button that starts the next target or scene.
         device_name: Part of the device's name, any case; None takes `device_index`.
         device_index: Position among the connected devices.
         joystick_axes: Number of each axis, for a device that SDL does not know as a gamepad. Numbers differ

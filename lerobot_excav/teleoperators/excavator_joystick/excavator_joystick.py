@@ -65,7 +65,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
         """Return the commands of the four joints, and a key for each button that was just pressed.
 
         Raises:
-            DeviceError: No device is open, or it is gone. Commands are never repeated.
+            DeviceError: The device is not open, or it was unplugged. The last command is never repeated.
         """
         if self._device is None:
             raise DeviceError("the gamepad is not connected; call connect() first.")
@@ -78,10 +78,10 @@ class ExcavatorJoystick(SimulationTeleoperator):
         return action
 
     def disconnect(self) -> None:
-        """Let go of the device.
+        """Close the device.
 
         Raises:
-            DeviceError: No device is open.
+            DeviceError: The device is not open.
         """
         if self._device is None:
             raise DeviceError("the gamepad is not connected.")

@@ -30,7 +30,7 @@ class Gamepad(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
 
 
 class KnownGamepad:
@@ -57,7 +57,7 @@ class KnownGamepad:
         return axes, {name: bool(self._controller.get_button(i)) for name, i in self._buttons.items()}
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
         self._controller.quit()
 
 
@@ -102,7 +102,7 @@ class PlainJoystick:
         return axes, {name: bool(self._joystick.get_button(i)) for name, i in self._buttons.items()}
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
         if self._joystick is not None:
             self._joystick.quit()
 
@@ -125,8 +125,8 @@ def open_gamepad(
         joystick_buttons: Number of each button in use, for such a device.
 
     Raises:
-        DeviceError: There is no such device, or it is a joystick that SDL does not know and the
-            configuration does not number.
+        DeviceError: The device is not there, or it is a joystick that SDL does not know and the configuration
+            does not number.
     """
     pygame, sdl_controller = _start_sdl()
     found = [pygame.joystick.Joystick(i).get_name() for i in range(pygame.joystick.get_count())]
@@ -154,7 +154,7 @@ def choose_device(found: list[str], *, index: int, name: str | None) -> int:
         name: Part of the name wanted, any case; the first match counts.
 
     Raises:
-        DeviceError: There is no such device.
+        DeviceError: No device has this position or name.
     """
     matches = [i for i, each in enumerate(found) if name is None or name.lower() in each.lower()]
     if name is None and index < len(found):
@@ -164,20 +164,20 @@ def choose_device(found: list[str], *, index: int, name: str | None) -> int:
     wanted = f"teleop.device_index={index}" if name is None else f"teleop.device_name={name!r}"
     listed = ", ".join(f"{i}: {each!r}" for i, each in enumerate(found)) or "none"
     raise DeviceError(
-        f"no gamepad for {wanted}; connected: {listed}. Plug one in, check that you may read /dev/input, or "
-        "use --teleop.type=excavator_operator, which needs none."
+        f"{wanted} does not match a gamepad; connected: {listed}. Plug one in, check that you may read /dev/input, "
+        "or use --teleop.type=excavator_operator, which needs no gamepad."
     )
 
 
 def lost(name: str) -> DeviceError:
     """Return the error for a device that was unplugged or ran out of power."""
-    return DeviceError(f"the gamepad {name!r} is gone; plug it in again and start the command anew.")
+    return DeviceError(f"the gamepad {name!r} is gone; plug it in again and restart the command.")
 
 
 def _start_sdl() -> tuple[Any, Any]:
     """Start SDL's joystick part without a window."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-    os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # there is no window to have the focus
+    os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # no window has the focus
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     import pygame
     from pygame._sdl2 import controller

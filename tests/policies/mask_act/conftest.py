@@ -6,13 +6,15 @@ from typing import Any
 import pytest
 import torch
 from lerobot.configs.types import FeatureType, PolicyFeature
-from torch import Tensor
+from torch import Tensor, nn
 
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
 MAIN, CAB, MASK = "observation.images.main", "observation.images.cab", "observation.images.target_mask"
+STATE = "observation.state"
 HEIGHT, WIDTH, CHUNK = 32, 48, 8
+BACKBONES = ("resnet_small", "resnet18")
 
 
 def visual(*shape: int) -> PolicyFeature:
@@ -20,22 +22,14 @@ def visual(*shape: int) -> PolicyFeature:
 
 
 INPUT_FEATURES = {
-    MAIN: visual(3, HEIGHT, WIDTH),
-    CAB: visual(3, HEIGHT, WIDTH),
-    MASK: visual(3, HEIGHT, WIDTH),
-    "observation.state": PolicyFeature(type=FeatureType.STATE, shape=(8,)),
+    **dict.fromkeys((MAIN, CAB, MASK), visual(3, HEIGHT, WIDTH)),
+    STATE: PolicyFeature(type=FeatureType.STATE, shape=(8,)),
 }
 OUTPUT_FEATURES = {"action": PolicyFeature(type=FeatureType.ACTION, shape=(4,))}
 
 TINY: dict[str, Any] = {
-    "preset": "fast",
-    "chunk_size": CHUNK,
-    "dim_model": 32,
-    "dim_feedforward": 48,
-    "n_heads": 4,
-    "n_encoder_layers": 1,
-    "device": "cpu",
-    "push_to_hub": False,
+    **{"preset": "fast", "chunk_size": CHUNK, "device": "cpu", "push_to_hub": False},
+    **{"dim_model": 32, "dim_feedforward": 48, "n_heads": 4, "n_encoder_layers": 1},
 }
 
 
@@ -49,12 +43,9 @@ def make_policy(*, seed: int = 0, **settings: Any) -> MaskACTPolicy:
     return MaskACTPolicy(make_config(**settings)).eval()
 
 
-def wake_mask_channel(policy: MaskACTPolicy) -> MaskACTPolicy:
-    """Give the fourth channel of the stem weights, as training would."""
-    stem = next(m for m in policy.modules() if isinstance(m, torch.nn.Conv2d))
-    with torch.no_grad():
-        stem.weight[:, 3] = torch.randn(stem.weight[:, 3].shape, generator=torch.Generator().manual_seed(5))
-    return policy
+def stem(network: nn.Module) -> nn.Conv2d:
+    """The first convolution, which reads the mask."""
+    return next(m for m in network.modules() if isinstance(m, nn.Conv2d))
 
 
 def make_batch(batch_size: int = 3, *, seed: int = 0, actions: bool = False) -> dict[str, Any]:
@@ -88,8 +79,16 @@ def policy() -> Callable[..., MaskACTPolicy]:
 
 @pytest.fixture
 def awake() -> Callable[..., MaskACTPolicy]:
-    """A policy whose stem has learned to see the mask."""
-    return lambda **settings: wake_mask_channel(make_policy(**settings))
+    """A policy whose stem has weights for the mask, as training would give it."""
+
+    def build(**settings: Any) -> MaskACTPolicy:
+        agent = make_policy(**settings)
+        weights = torch.randn(stem(agent).weight[:, 3].shape, generator=torch.Generator().manual_seed(5))
+        with torch.no_grad():
+            stem(agent).weight[:, 3] = weights
+        return agent
+
+    return build
 
 
 @pytest.fixture

@@ -3,34 +3,22 @@ from dataclasses import fields, replace
 
 import draccus
 import pytest
+import torch
 from lerobot.configs import PreTrainedConfig
-from lerobot.configs.types import FeatureType, PolicyFeature
+from lerobot.optim import AdamWConfig
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import PRESETS
 
-MAIN, CAB, MASK = "observation.images.main", "observation.images.cab", "observation.images.target_mask"
-
-
-def visual(*shape):
-    return PolicyFeature(type=FeatureType.VISUAL, shape=shape)
-
-
-def test_mask_act_is_registered_with_lerobot():
-    assert PreTrainedConfig.get_choice_class("mask_act") is MaskACTConfig
+from .conftest import CAB, MAIN, MASK, visual
 
 
 def test_default_is_the_paper_network_and_needs_no_download():
     config = MaskACTConfig(device="cpu")
-    paper = (
-        config.vision_backbone,
-        config.chunk_size,
-        config.kl_weight,
-        config.dim_model,
-        config.dim_feedforward,
-    )
-    assert paper == ("resnet18", 100, 10.0, 512, 3200)
+    assert (config.vision_backbone, config.chunk_size, config.kl_weight) == ("resnet18", 100, 10.0)
+    assert (config.dim_model, config.dim_feedforward) == (512, 3200)
     assert config.pretrained_backbone_weights is None
     assert not config.withhold_mask
     assert not config.target_token
@@ -39,21 +27,11 @@ def test_default_is_the_paper_network_and_needs_no_download():
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_fills_every_field_that_is_left_open(name):
     config = MaskACTConfig(preset=name, device="cpu")
-    open_fields = {"main_camera"}  # inferred from the features
+    optional = {"main_camera", "temporal_ensemble_coeff", "pretrained_backbone_weights"}
     own = {f.name for f in fields(MaskACTConfig)} - {f.name for f in fields(PreTrainedConfig)}
-    optional = {"temporal_ensemble_coeff", "pretrained_backbone_weights"}
-    assert {f for f in own if getattr(config, f) is None} <= open_fields | optional
+    assert {f for f in own if getattr(config, f) is None} <= optional
     assert {f: getattr(config, f) for f in PRESETS[name]} == PRESETS[name]
-
-
-def test_presets_decide_the_same_fields():
-    assert len({frozenset(preset) for preset in PRESETS.values()}) == 1
-
-
-def test_a_field_set_by_hand_wins_over_the_preset():
-    config = MaskACTConfig(preset="fast", dim_model=128, use_vae=True, device="cpu")
-    assert (config.dim_model, config.use_vae) == (128, True)
-    assert config.actions_per_token == PRESETS["fast"]["actions_per_token"]
+    assert PRESETS[name].keys() == PRESETS["paper"].keys()
 
 
 def test_a_filled_configuration_does_not_change_its_preset():
@@ -63,23 +41,11 @@ def test_a_filled_configuration_does_not_change_its_preset():
 
 def test_configuration_survives_its_file_and_takes_overrides(tmp_path, config):
     config(withhold_mask=True, n_action_steps=4).save_pretrained(tmp_path)
-    loaded = PreTrainedConfig.from_pretrained(
-        tmp_path, cli_overrides=["--withhold_mask=false", "--dropout=0.2"]
-    )
-    assert (loaded.withhold_mask, loaded.dropout, loaded.n_action_steps) == (False, 0.2, 4)
-    assert loaded.dim_model == config().dim_model
+    overrides = ["--withhold_mask=false", "--dropout=0.2", f"--main_camera={CAB}"]
+    loaded = PreTrainedConfig.from_pretrained(tmp_path, cli_overrides=overrides)
+    assert (loaded.withhold_mask, loaded.dropout, loaded.main_camera) == (False, 0.2, CAB)
+    assert (loaded.n_action_steps, loaded.dim_model) == (4, config().dim_model)
     assert json.loads((tmp_path / "config.json").read_text())["type"] == "mask_act"
-
-
-def test_command_line_decodes_every_kind_of_field():
-    args = ["--preset=fast", "--target_token=true", "--main_camera=observation.images.cab", "--dim_model=64"]
-    config = draccus.parse(MaskACTConfig, args=args)
-    assert (config.preset, config.target_token, config.main_camera, config.dim_model) == (
-        "fast",
-        True,
-        "observation.images.cab",
-        64,
-    )
 
 
 @pytest.mark.parametrize(
@@ -114,21 +80,15 @@ def test_the_command_line_says_which_setting_is_bad(capsys):
     assert "preset='quick' is not known; allowed: 'paper', 'fast'." in said
 
 
-def test_action_steps_follow_chunk_size_and_ensembling(config):
+def test_open_settings_follow_from_others(config):
     assert config().n_action_steps == 8
     assert config(temporal_ensemble_coeff=0.01).n_action_steps == 1
-
-
-def test_pretrained_weights_freeze_the_norm_and_training_from_scratch_does_not():
-    assert MaskACTConfig(device="cpu").backbone_norm == "batch"
-    weights = "ResNet18_Weights.IMAGENET1K_V1"
-    assert MaskACTConfig(pretrained_backbone_weights=weights, device="cpu").backbone_norm == "frozen"
-
-
-def test_main_camera_is_the_first_that_is_not_the_mask(config):
-    features = {MASK: visual(3, 32, 48), CAB: visual(3, 32, 48), MAIN: visual(3, 32, 48)}
+    weights = {"vision_backbone": "resnet18", "pretrained_backbone_weights": "ResNet18_Weights.IMAGENET1K_V1"}
+    assert (config().backbone_norm, config(**weights).backbone_norm) == ("batch", "frozen")
+    features = dict.fromkeys((MASK, CAB, MAIN), visual(3, 32, 48))
     assert config(input_features=features).main_camera_key == CAB
     assert config(input_features=features, main_camera=MAIN).main_camera_key == MAIN
+    assert config(input_features=features, mask_key=CAB).camera_keys == [MASK, MAIN]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +98,11 @@ def test_main_camera_is_the_first_that_is_not_the_mask(config):
         ({MAIN: visual(3, 32, 48)}, {"main_camera": "observation.images.top"}, r"images.top.*images.main"),
         ({MAIN: visual(3, 32, 48)}, {"main_camera": MASK}, r"is the mask itself.*images.main"),
         ({MAIN: visual(1, 32, 48)}, {}, r"images.main has 1 channel"),
-        ({MAIN: visual(3, 32, 48), MASK: visual(3, 16, 48)}, {}, r"target_mask is 16 x 48.*main is 32 x 48"),
+        (
+            {MAIN: visual(3, 32, 48), MASK: visual(3, 16, 48)},
+            {},
+            r"target_mask has shape \(3, 16, 48\).*main has shape \(3, 32, 48\)",
+        ),
     ],
 )
 def test_features_that_do_not_fit_are_refused(config, features, settings, message):
@@ -146,36 +110,40 @@ def test_features_that_do_not_fit_are_refused(config, features, settings, messag
         config(input_features=features, **settings).validate_features()
 
 
-def test_mask_key_names_the_mask(config):
-    features = {MAIN: visual(3, 32, 48), "observation.images.dig_here": visual(3, 32, 48)}
-    assert config(input_features=features, mask_key="observation.images.dig_here").camera_keys == [MAIN]
-
-
-def test_a_dataset_without_masks_is_refused_unless_the_mask_is_withheld(config):
-    features = {MAIN: {"dtype": "video", "shape": (32, 48, 3)}, "action": {"dtype": "float32", "shape": (4,)}}
-    with pytest.raises(ConfigurationError, match=r"target_mask.*images\.main.*withhold_mask=true"):
-        config().set_dataset_feature_metadata(features)
-    config(withhold_mask=True).set_dataset_feature_metadata(features)
-
-
-def test_learning_rate_schedules():
-    def schedule(**settings):
-        return MaskACTConfig(device="cpu", **settings).get_scheduler_preset()
-
-    assert schedule() is None
-    assert schedule(lr_warmup_steps=10).type == "constant_with_warmup"
-    cosine = schedule(lr_schedule="cosine", lr_warmup_steps=10)
-    assert (cosine.type, cosine.num_warmup_steps) == ("cosine_annealing_with_warmup", 10)
+@pytest.mark.parametrize(
+    ("settings", "kind", "warmup"),
+    [
+        ({}, None, 0),
+        ({"lr_warmup_steps": 10}, "constant_with_warmup", 10),
+        ({"lr_schedule": "cosine", "lr_warmup_steps": 10}, "cosine_annealing_with_warmup", 10),
+    ],
+)
+def test_learning_rate_schedules(settings, kind, warmup):
+    schedule = MaskACTConfig(device="cpu", **settings).get_scheduler_preset()
+    assert (schedule and schedule.type) == kind
+    assert schedule is None or schedule.num_warmup_steps == warmup
 
 
 @pytest.mark.parametrize("fused", [True, False])
 def test_optimizer_settings_reach_the_optimizer(policy, fused):
-    agent = policy(
-        optimizer_fused=fused, optimizer_lr=0.1, optimizer_lr_backbone=0.2, optimizer_weight_decay=0.3
-    )
+    rates = {"optimizer_lr": 0.1, "optimizer_lr_backbone": 0.2, "optimizer_weight_decay": 0.3}
+    agent = policy(optimizer_fused=fused, **rates)
     optimizer = agent.config.get_optimizer_preset().build(agent.get_optim_params())
     rest, backbone = optimizer.param_groups
     assert (rest["lr"], backbone["lr"], rest["weight_decay"]) == (0.1, 0.2, 0.3)
     assert bool(rest["fused"]) == fused
     counted = sum(len(group["params"]) for group in optimizer.param_groups)
     assert counted == sum(p.requires_grad for p in agent.parameters())
+
+
+def test_the_fused_update_is_that_of_lerobots_adamw():
+    start, results = torch.randn(7, 5, generator=torch.Generator().manual_seed(0)), []
+    for kind in (AdamWConfig, FusedAdamWConfig):
+        parameter = torch.nn.Parameter(start.clone())
+        optimizer = kind(lr=1e-2, weight_decay=0.1).build([parameter])
+        gradients = torch.Generator().manual_seed(1)
+        for _ in range(5):
+            parameter.grad = torch.randn(7, 5, generator=gradients)
+            optimizer.step()
+        results.append(parameter.detach())
+    torch.testing.assert_close(*results, rtol=1e-5, atol=1e-6)

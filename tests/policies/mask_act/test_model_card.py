@@ -1,10 +1,14 @@
 import json
+from pathlib import Path
 
 import pytest
-import yaml
+from huggingface_hub import ModelCard
+from lerobot.configs import PreTrainedConfig
 
-from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
+from lerobot_excav.policies import mask_act
+from lerobot_excav.policies.mask_act.model_card import TEMPLATE, CardFacts, model_card
 
+LANDED = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
 SETTINGS = {
     "dataset": {"repo_id": "local/grasping", "root": "/data", "episodes": [0, 1, 2], "eval_split": 0.2},
     "optimizer": {"lr": 3e-4},
@@ -17,22 +21,26 @@ SETTINGS = {
 @pytest.fixture
 def trained(tmp_path):
     """The folders of a checkpoint at step 4000 of 5000."""
-    folder = tmp_path / "004000" / "pretrained_model"
+    folder, state = tmp_path / "004000" / "pretrained_model", tmp_path / "004000" / "training_state"
     folder.mkdir(parents=True)
-    (folder / "train_config.json").write_text(json.dumps(SETTINGS))
-    state = folder.parent / "training_state"
     state.mkdir()
+    (folder / "train_config.json").write_text(json.dumps(SETTINGS))
     (state / "training_step.json").write_text(json.dumps({"step": 4000}))
     return folder
 
 
-def front_matter(card):
-    _, head, _ = card.split("---\n", 2)
-    return yaml.safe_load(head)
+def missing(card, *rows):
+    return [row for row in rows if row not in str(card)]
 
 
-def test_the_front_matter_is_what_the_hub_reads(trained, config):
-    assert front_matter(model_card(trained, config(), 1, CardFacts(license="mit"))) == {
+def test_the_template_lies_in_the_package_and_so_in_the_wheel():
+    assert TEMPLATE.parent == Path(mask_act.__file__).parent
+    assert TEMPLATE.is_file()
+
+
+def test_the_metadata_is_what_the_hub_reads(trained, tmp_path, config):
+    model_card(trained, config(), 1, CardFacts(license="mit")).save(tmp_path / "README.md")
+    assert ModelCard.load(tmp_path / "README.md").data.to_dict() == {
         "library_name": "lerobot",
         "license": "mit",
         "model_name": "mask_act",
@@ -42,11 +50,14 @@ def test_the_front_matter_is_what_the_hub_reads(trained, config):
     }
 
 
-def test_the_card_tells_how_the_policy_was_trained(trained, config):
+def test_the_card_tells_how_the_policy_was_trained_where_that_is_known(trained, tmp_path, config):
     card = model_card(trained, config(), 1, CardFacts())
     rows = ["Episodes | 3", "Steps | 4000", "Batch size | 16", "Learning rate | 0.0003", "Seed | 7"]
-    assert [row for row in rows if row not in card] == []
-    assert "/data" not in card
+    assert missing(card, *rows) == []
+    assert "/data" not in str(card)
+    card = model_card(tmp_path, config(), 1, CardFacts())
+    assert "## Training" not in str(card)
+    assert "datasets" not in card.data.to_dict()
 
 
 @pytest.mark.parametrize(
@@ -60,41 +71,49 @@ def test_the_card_tells_how_the_policy_was_trained(trained, config):
 def test_the_card_counts_the_held_out_episodes_where_it_can(trained, config, dataset, held_out):
     settings = {**SETTINGS, "dataset": {"repo_id": "local/grasping", **dataset}}
     (trained / "train_config.json").write_text(json.dumps(settings))
-    assert f"| Held out for validation | {held_out} |" in model_card(trained, config(), 1, CardFacts())
+    card = model_card(trained, config(), 1, CardFacts())
+    assert missing(card, f"| Held out for validation | {held_out} |") == []
 
 
-def test_without_training_settings_the_card_does_not_speak_of_training(tmp_path, config):
-    card = model_card(tmp_path, config(), 1, CardFacts())
-    assert "## Training" not in card
-    assert "datasets" not in front_matter(card)
-
-
-def test_the_card_tells_network_and_features(tmp_path, config):
-    card = model_card(tmp_path, config(), 2_700_000, CardFacts())
-    rows = ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]
-    assert [row for row in rows if row not in card] == []
-
-
-def test_the_card_tells_which_paths_the_mask_has(tmp_path, config):
-    plain, token, blind = (
-        model_card(tmp_path, config(**settings), 1, CardFacts())
-        for settings in ({}, {"target_token": True}, {"withhold_mask": True})
-    )
-    assert "fourth channel of the main camera." in plain
-    assert "and a token pooled under the mask" in token
-    assert "no-condition variant" in blind
-
-
-@pytest.mark.parametrize(("channels", "word"), [(True, "yes"), (False, "no")])
-def test_the_card_tells_whether_pixels_have_coordinates(tmp_path, config, channels, word):
-    card = model_card(tmp_path, config(coordinate_channels=channels), 1, CardFacts())
-    assert f"| Coordinate channels | {word} |" in card
-    assert ("row and column of every pixel" in card) == channels
+@pytest.mark.parametrize(
+    ("settings", "rows"),
+    [
+        ({}, ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]),
+        (
+            {},
+            [
+                "four-channel views; trained",
+                "a fourth channel of the main camera. ",
+                "Coordinate channels | no",
+            ],
+        ),
+        (
+            {"target_token": True},
+            ["main camera and a token pooled under the mask. ", "| Target token | yes |"],
+        ),
+        ({"withhold_mask": True}, ["(`withhold_mask`): the no-condition variant. Weights"]),
+        ({"coordinate_channels": True}, ["row and column of every pixel", "| Coordinate channels | yes |"]),
+    ],
+)
+def test_the_card_tells_network_features_and_paths_of_the_mask(tmp_path, config, settings, rows):
+    assert missing(model_card(tmp_path, config(**settings), 2_700_000, CardFacts()), *rows) == []
 
 
 def test_facts_make_title_command_and_results(tmp_path, config):
     facts = CardFacts(title="Grasping", env_type="fr5_grasp", results="| row |\n")
     card = model_card(tmp_path, config(), 1, facts)
-    assert "\n# Grasping\n" in card
-    assert "--env.type=fr5_grasp " in card
-    assert card.endswith("## Evaluation\n\n| row |\n")
+    assert missing(card, "\n# Grasping\n", "--env.type=fr5_grasp ") == []
+    assert str(card).endswith("## Evaluation\n\n| row |\n")
+
+
+def test_the_landed_card_is_what_the_template_gives():
+    landed = ModelCard.load(LANDED / "README.md")
+    facts = CardFacts(title="FR5 grasping: mask_act with a target token", env_type="fr5_grasp")
+    fresh = model_card(LANDED, PreTrainedConfig.from_pretrained(LANDED), 1_800_000, facts)
+    assert {**fresh.data.to_dict(), "datasets": "local/fr5_grasp_paired"} == landed.data.to_dict()
+    sections, expected = (
+        {part.partition("\n")[0]: part for part in card.text.split("\n## ")} for card in (landed, fresh)
+    )
+    # The training settings and the results were given when the card was written.
+    assert sections.keys() - expected.keys() == {"Training"}
+    assert {name for name, part in expected.items() if part != sections[name]} == {"Evaluation"}

@@ -3,7 +3,7 @@ import torch
 
 from lerobot_excav.errors import ConfigurationError
 
-MAIN, MASK = "observation.images.main", "observation.images.target_mask"
+from .conftest import MAIN, MASK
 
 
 @pytest.fixture
@@ -24,20 +24,15 @@ def counted(awake, monkeypatch):
     return build
 
 
-def test_a_plan_is_executed_in_order_and_made_once(counted, batch):
-    agent, sizes = counted()
+@pytest.mark.parametrize(("n_action_steps", "plans"), [(8, 1), (2, 4)])
+def test_a_plan_is_executed_in_order_and_replaced_when_it_has_run_out(counted, batch, n_action_steps, plans):
+    agent, sizes = counted(n_action_steps=n_action_steps)
     observation = batch()
-    plan = agent.predict_action_chunk(observation)
+    plan = agent.predict_action_chunk(observation)[:, :n_action_steps]
+    sizes.clear()
     actions = torch.stack([agent.select_action(observation) for _ in range(8)], dim=1)
-    torch.testing.assert_close(actions, plan, rtol=0, atol=0)
-    assert sizes == [3, 3]
-
-
-def test_n_action_steps_decides_when_the_next_plan_is_made(counted, batch):
-    agent, sizes = counted(n_action_steps=2)
-    for seed in range(6):
-        agent.select_action(batch(seed=seed))
-    assert sizes == [3, 3, 3]
+    torch.testing.assert_close(actions, plan.repeat(1, plans, 1), rtol=0, atol=0)
+    assert sizes == [3] * plans
 
 
 def test_a_new_mask_drops_only_the_plan_of_its_environment(counted, batch, mask):
@@ -64,57 +59,48 @@ def test_a_new_mask_restarts_only_the_ensemble_of_its_environment(awake, batch, 
     for seed in range(3):
         changed.select_action(batch(seed=seed))
         steady.select_action(batch(seed=seed))
-    observation, same = batch(seed=3), batch(seed=3)
+    observation = batch(seed=3)
     observation[MASK][1] = mask(1, top=0, left=0)[0]
-    action = changed.select_action(observation)
-    expected = steady.select_action(same)
+    action, expected = changed.select_action(observation), steady.select_action(batch(seed=3))
     torch.testing.assert_close(action[[0, 2]], expected[[0, 2]])
     torch.testing.assert_close(action[1], changed.predict_action_chunk(observation)[1, 0])
     assert not torch.allclose(action[1], expected[1], atol=1e-4)
 
 
-def test_a_withheld_mask_changes_no_plan(counted, batch, mask):
+def test_a_withheld_mask_changes_no_plan_and_the_observation_is_left_alone(counted, batch, mask):
     agent, sizes = counted(withhold_mask=True)
-    observation = batch()
-    agent.select_action(observation)
-    observation[MASK] = mask(3, top=0, left=0)
+    agent.select_action(batch())
+    observation = {**batch(), MASK: mask(3, top=0, left=0)}
+    copy = {key: value.clone() for key, value in observation.items()}
     agent.select_action(observation)
     assert sizes == [3]
+    assert observation.keys() == copy.keys()
+    assert all(torch.equal(observation[key], copy[key]) for key in copy)
 
 
-def test_reset_forgets_plans_and_admits_another_batch_size(awake, batch):
-    agent = awake()
+@pytest.mark.parametrize("settings", [{}, {"temporal_ensemble_coeff": 0.01}])
+def test_reset_forgets_plans_and_admits_another_batch_size(awake, batch, settings):
+    agent = awake(**settings)
     agent.select_action(batch(3))
-    with pytest.raises(ConfigurationError, match="reset"):
+    with pytest.raises(ConfigurationError, match=r"policy\.reset\(\)"):
         agent.select_action(batch(2))
     agent.reset()
     observation = batch(2, seed=7)
-    torch.testing.assert_close(
-        agent.select_action(observation), agent.predict_action_chunk(observation)[:, 0]
-    )
+    expected = agent.predict_action_chunk(observation)[:, 0]
+    torch.testing.assert_close(agent.select_action(observation), expected)
 
 
-def test_reset_forgets_the_ensemble(awake, batch):
-    agent = awake(temporal_ensemble_coeff=0.01)
-    agent.select_action(batch(3))
-    agent.reset()
-    observation = batch(2, seed=7)
-    torch.testing.assert_close(
-        agent.select_action(observation), agent.predict_action_chunk(observation)[:, 0]
-    )
-
-
-def test_a_plan_may_start_in_inference_mode_and_go_on_outside(awake, batch, mask):
+def test_a_plan_may_start_in_inference_mode_and_be_replaced_outside(awake, batch, mask):
     agent = awake()
-    observation = batch()
     with torch.inference_mode():
-        agent.select_action(observation)
-    other = {**observation, MASK: mask(3, top=0, left=0)}
-    assert torch.isfinite(agent.select_action(other)).all()
+        agent.select_action(batch())
+    assert torch.isfinite(agent.select_action({**batch(), MASK: mask(3, top=0, left=0)})).all()
 
 
-def test_selecting_an_action_leaves_the_observation_alone(awake, batch):
-    agent, observation, copy = awake(), batch(), batch()
+def test_a_mask_that_is_not_binary_is_refused_even_while_a_plan_lasts(awake, batch):
+    agent, observation = awake(), batch()
     agent.select_action(observation)
-    assert observation.keys() == copy.keys()
-    assert all(torch.equal(observation[key], copy[key]) for key in copy)
+    observation[MASK] *= 0.9
+    for act in (agent.select_action, agent.predict_action_chunk):
+        with pytest.raises(ConfigurationError, match="not binary"):
+            act(observation)

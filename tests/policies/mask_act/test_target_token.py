@@ -53,26 +53,30 @@ def test_the_encoding_of_a_cell_centre_is_the_encoding_that_lerobot_gives_the_ce
     torch.testing.assert_close(columns, grid[DIM // 2 :, 0, :].T, atol=1e-5, rtol=0)
 
 
-@pytest.mark.parametrize(
-    ("top", "left", "height", "width"), [(0, 0, 6, 6), (7, 9, 3, 20), (40, 60, 8, 4), (0, 0, 48, 64)]
-)
-def test_the_position_is_the_mean_over_the_masks_pixels(token, top, left, height, width):
-    mask = blob(top, left, height, width)
-    _, position = token(features(), mask)
+MASKS = {
+    "corner": blob(0, 0),
+    "wide": blob(7, 9, 3, 20),
+    "whole picture": blob(0, 0, 48, 64),
+    "one pixel": blob(47, 63, 1, 1),
+    "two blobs": blob(2, 3, 4, 4) + blob(30, 50, 4, 8),
+    "stray pixel": blob(20, 20) + blob(40, 60, 1, 1),
+}
+
+
+@pytest.mark.parametrize("mask", MASKS.values(), ids=MASKS)
+def test_the_position_is_the_mean_over_the_masks_pixels(token, mask):
+    content, position = token(features(), mask)
     torch.testing.assert_close(position[0], pixel_by_pixel(mask), atol=1e-5, rtol=0)
+    assert not torch.equal(content[0], token.no_target_embed)
 
 
 @pytest.mark.parametrize("shift", [(1, 0), (0, 1), (-1, -1)])
 def test_a_shift_by_one_pixel_within_a_cell_moves_the_token(token, shift):
     here, there = blob(21, 37), blob(21 + shift[0], 37 + shift[1])  # both within cell (1, 2)
-    content, position = token(features(), here)
-    content_there, position_there = token(features(), there)
-    expected = pixel_by_pixel(there) - pixel_by_pixel(here)
-    assert expected.abs().max() > 0.02
-    torch.testing.assert_close((position_there - position)[0], expected, atol=1e-5, rtol=0)
-    torch.testing.assert_close(
-        content_there - content, token.position_proj(position_there) - token.position_proj(position)
-    )
+    (content, position), (content_there, position_there) = token(features(), here), token(features(), there)
+    assert (position_there - position).abs().max() > 0.02
+    moved = token.position_proj(position_there) - token.position_proj(position)
+    torch.testing.assert_close(content_there - content, moved)
 
 
 def test_pictures_that_the_cells_do_not_tile_are_encoded_from_edge_to_edge(token):
@@ -82,42 +86,15 @@ def test_pictures_that_the_cells_do_not_tile_are_encoded_from_edge_to_edge(token
     torch.testing.assert_close(position, tiled, atol=1e-3, rtol=0)
 
 
-def test_a_mask_over_one_cell_takes_the_features_of_that_cell_alone(token):
+@pytest.mark.parametrize(
+    ("box", "shares"),
+    [((16, 0, 16, 16), {(1, 0): 1.0}), ((0, 12, 16, 20), {(0, 0): 0.2, (0, 1): 0.8})],
+)
+def test_the_features_of_cells_weigh_as_much_as_the_mask_covers_them(token, box, shares):
     maps = features()
-    content, position = token(maps, blob(16, 0, 16, 16))
-    expected = 0.7 * maps[0, :, 1, 0] + token.position_proj(position[0]) + token.kind_embed
-    torch.testing.assert_close(content[0], expected)
-
-
-def test_the_features_of_cells_weigh_as_much_as_the_mask_covers_them(token):
-    maps = features()
-    content, position = token(maps, blob(0, 12, 16, 20))  # a quarter of cell 0, all of cell 1
-    pooled = (content[0] - token.position_proj(position[0]) - token.kind_embed) / 0.7
-    torch.testing.assert_close(pooled, (maps[0, :, 0, 0] + 4 * maps[0, :, 0, 1]) / 5)
-
-
-def test_two_blobs_pool_to_their_mean_by_area(token):
-    one, other = blob(2, 3, 4, 4), blob(30, 50, 4, 8)
-    (content_1, position_1), (content_2, position_2) = token(features(), one), token(features(), other)
-    content, position = token(features(), one + other)
-    torch.testing.assert_close(position, (position_1 + 2 * position_2) / 3)
-    torch.testing.assert_close(content, (content_1 + 2 * content_2) / 3)
-
-
-def test_stray_pixels_move_the_token_by_no_more_than_their_share(token):
-    clean = blob(20, 20)
-    noisy = clean.clone()
-    noisy[..., 40, 60] = 1
-    _, position = token(features(), clean)
-    _, disturbed = token(features(), noisy)
-    assert 0 < (disturbed - position).abs().max() <= 2 / 37
-
-
-def test_a_single_pixel_is_a_target(token):
-    mask = blob(47, 63, 1, 1)
-    content, position = token(features(), mask)
-    torch.testing.assert_close(position[0], pixel_by_pixel(mask), atol=1e-5, rtol=0)
-    assert not torch.equal(content[0], token.no_target_embed)
+    content, position = token(maps, blob(*box))
+    pooled = sum(share * maps[0, :, row, column] for (row, column), share in shares.items())
+    torch.testing.assert_close(content[0], 0.7 * pooled + token.position_proj(position[0]) + token.kind_embed)
 
 
 def test_an_empty_mask_gives_the_learned_token_whatever_the_picture(token):
@@ -139,13 +116,11 @@ def test_an_empty_mask_beside_a_full_one_leaves_finite_gradients(token):
     assert maps.grad[1].any()
 
 
-def test_a_fresh_token_reads_the_place_alone(fresh):
-    assert torch.equal(fresh(features(0), blob(3, 5))[0], fresh(features(1), blob(3, 5))[0])
-    assert not torch.equal(fresh(features(0), blob(3, 5))[0], fresh(features(0), blob(3, 6))[0])
-
-
-def test_training_finds_the_features(fresh):
-    fresh(features(), blob(3, 5))[0].square().sum().backward()
+def test_a_fresh_token_reads_the_place_alone_and_training_finds_the_features(fresh):
+    token, _ = fresh(features(0), blob(3, 5))
+    assert torch.equal(token, fresh(features(1), blob(3, 5))[0])
+    assert not torch.equal(token, fresh(features(0), blob(3, 6))[0])
+    token.square().sum().backward()
     assert fresh.feature_gain.grad != 0
 
 

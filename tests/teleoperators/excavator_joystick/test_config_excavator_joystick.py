@@ -33,13 +33,13 @@ class Command:
         ({"joystick_buttons": {"a": 0, "b": 1}}, "it must number back, start"),
     ],
 )
-def test_an_impossible_value_is_named_with_what_is_allowed(settings: dict[str, object], message: str) -> None:
+def test_an_impossible_value_is_named_with_what_is_allowed(settings, message):
     with pytest.raises(ConfigurationError) as raised:
         ExcavatorJoystickConfig(**settings)
     assert message in str(raised.value)
 
 
-def test_a_joystick_can_be_numbered_on_the_command_line() -> None:
+def test_a_joystick_can_be_numbered_on_the_command_line():
     flags = ["--teleop.type=excavator_joystick", "--teleop.invert=[left_y]"]
     flags += ["--teleop.joystick_axes={left_x: 0, left_y: 1, right_x: 3, right_y: 4}"]
     config = draccus.parse(Command, args=[*flags, "--teleop.joystick_buttons={back: 6, start: 7}"]).teleop

@@ -1,8 +1,5 @@
 """The gamepad as LeRobot's commands see it."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from lerobot_excav.errors import DeviceError
@@ -18,68 +15,61 @@ class StandInPad:
 
     name = "Pad"
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.axes = dict.fromkeys(("left_x", "left_y", "right_x", "right_y"), 0.0)
         self.down: set[str] = set()
         self.is_lost = self.is_closed = False
 
-    def open(self, **settings: Any) -> "StandInPad":
+    def open(self, **settings):
         self.settings = settings
         return self
 
-    def read(self) -> tuple[dict[str, float], dict[str, bool]]:
+    def read(self):
         if self.is_lost:
             raise lost(self.name)
         return self.axes, {button: button in self.down for button in self.settings["buttons"]}
 
-    def close(self) -> None:
+    def close(self):
         self.is_closed = True
 
 
 @pytest.fixture
-def pad() -> StandInPad:
+def pad():
     return StandInPad()
 
 
-def joystick_on(pad: StandInPad, calibration_dir: Path, **settings: Any) -> ExcavatorJoystick:
-    config = ExcavatorJoystickConfig(calibration_dir=calibration_dir, **settings)
-    teleop = ExcavatorJoystick(config, open_device=pad.open)
-    teleop.connect()
-    return teleop
+@pytest.fixture
+def connect(pad, tmp_path):
+    """Connect a joystick with the given settings to the stand-in."""
 
+    def _connect(**settings):
+        config = ExcavatorJoystickConfig(calibration_dir=tmp_path, **settings)
+        teleop = ExcavatorJoystick(config, open_device=pad.open)
+        teleop.connect()
+        return teleop
 
-def test_actions_have_the_robots_names(pad: StandInPad, tmp_path: Path) -> None:
-    teleop = joystick_on(pad, tmp_path)
-    assert teleop.action_features == dict.fromkeys(STILL, float)
-    assert teleop.feedback_features == {}
-    assert list(teleop.get_action()) == list(STILL)
-
-
-def test_sticks_become_commands(pad: StandInPad, tmp_path: Path) -> None:
-    pad.axes |= {"left_x": -1.0, "right_y": -1.0}
-    assert joystick_on(pad, tmp_path).get_action() == STILL | {"swing.vel": 1.0, "boom.vel": -1.0}
+    return _connect
 
 
 @pytest.mark.parametrize(
     ("settings", "command"),
     [
-        ({}, STILL | {"arm.vel": -0.5}),
-        ({"pattern": "sae"}, STILL | {"boom.vel": 0.5}),
-        ({"invert": ["left_y"]}, STILL | {"arm.vel": 0.5}),
-        ({"expo": 1.0}, STILL | {"arm.vel": -0.125}),
-        ({"dead_zone": 0.6}, STILL),
+        ({}, {"swing.vel": 1.0, "arm.vel": -0.5}),
+        ({"pattern": "sae"}, {"swing.vel": 1.0, "boom.vel": 0.5}),
+        ({"invert": ["left_y"]}, {"swing.vel": 1.0, "arm.vel": 0.5}),
+        ({"expo": 1.0}, {"swing.vel": 1.0, "arm.vel": -0.125}),
+        ({"dead_zone": 0.6}, {"swing.vel": 1.0}),
     ],
 )
-def test_every_setting_of_the_response_has_an_effect(
-    pad: StandInPad, tmp_path: Path, settings: dict[str, Any], command: dict[str, float]
-) -> None:
-    pad.axes["left_y"] = 0.5
-    teleop = joystick_on(pad, tmp_path, **{"dead_zone": 0.0, **settings})
-    assert teleop.get_action() == pytest.approx(command)
+def test_sticks_become_commands_as_the_settings_say(pad, connect, settings, command):
+    pad.axes |= {"left_x": -1.0, "left_y": 0.5}
+    action = connect(**{"dead_zone": 0.0, **settings}).get_action()
+    assert action == pytest.approx(STILL | command)
+    assert list(action) == list(STILL)
 
 
-def test_a_press_is_told_once(pad: StandInPad, tmp_path: Path) -> None:
-    teleop = joystick_on(pad, tmp_path, reinitialise_button="x", next_scene_button="y")
+def test_a_press_is_told_once(pad, connect):
+    teleop = connect(reinitialise_button="x", next_scene_button="y")
     teleop.get_action()
     pad.down = {"x"}
     assert teleop.get_action() == STILL | {"reinitialise": 1.0}
@@ -88,20 +78,16 @@ def test_a_press_is_told_once(pad: StandInPad, tmp_path: Path) -> None:
     assert teleop.get_action() == STILL | {"next_scene": 1.0}
 
 
-def test_the_chosen_device_is_opened(pad: StandInPad, tmp_path: Path) -> None:
-    joystick_on(pad, tmp_path, device_index=2, device_name="pad", joystick_buttons={"back": 6, "start": 7})
-    assert pad.settings == {
-        "index": 2,
-        "name": "pad",
-        "buttons": ("back", "start"),
-        "joystick_axes": None,
-        "joystick_buttons": {"back": 6, "start": 7},
-    }
+def test_the_chosen_device_is_opened(pad, connect):
+    numbers = {"back": 6, "start": 7}
+    connect(device_index=2, device_name="pad", joystick_buttons=numbers)
+    chosen = {"index": 2, "name": "pad", "buttons": ("back", "start")}
+    assert pad.settings == chosen | {"joystick_axes": None, "joystick_buttons": numbers}
 
 
-def test_a_lost_device_never_repeats_its_last_command(pad: StandInPad, tmp_path: Path) -> None:
+def test_a_lost_device_never_repeats_its_last_command(pad, connect):
     pad.axes["left_x"] = 1.0
-    teleop = joystick_on(pad, tmp_path)
+    teleop = connect()
     assert teleop.get_action()["swing.vel"] == -1.0
     pad.is_lost = True
     for _ in range(2):
@@ -109,8 +95,8 @@ def test_a_lost_device_never_repeats_its_last_command(pad: StandInPad, tmp_path:
             teleop.get_action()
 
 
-def test_use_out_of_turn_is_refused(pad: StandInPad, tmp_path: Path) -> None:
-    teleop = joystick_on(pad, tmp_path)
+def test_use_out_of_turn_is_refused(pad, connect):
+    teleop = connect()
     with pytest.raises(DeviceError, match="connected already"):
         teleop.connect()
     teleop.disconnect()

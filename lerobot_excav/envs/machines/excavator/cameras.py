@@ -1,25 +1,6 @@
 """Poses of the cameras."""
 
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraPose:
-    """Where a camera stands and what it looks at; its upper edge points up.
-
-    Attributes:
-        position: Eye point (3,) [m], in the frame of the body that carries the camera.
-        target: A point on the optical axis (3,) [m], same frame.
-        fovy_deg: Vertical field of view [degrees].
-    """
-
-    position: tuple[float, float, float]
-    target: tuple[float, float, float]
-    fovy_deg: float
-
+from lerobot_excav.envs.machines.pinhole import CameraPose
 
 MAIN = CameraPose(position=(3.6, -4.6, 7.4), target=(-0.5, 0.25, 0.2), fovy_deg=46.0)
 """Fixed to the world: the pile and the ground around it, the carrier and most of the target box, from the front right.
@@ -37,12 +18,3 @@ down to the dig area, and over the wall of the target box to the soil in it."""
 
 SIDE = CameraPose(position=(4.0, -4.6, 3.2), target=(4.4, 0.0, 0.0), fovy_deg=44.0)
 """Fixed to the house (swing frame): the bucket from the right, wherever it digs or dumps. For people, not policies."""
-
-
-def axes(pose: CameraPose) -> NDArray[np.float64]:
-    """Return the rotation (3, 3) whose columns are the camera's right, up and backward axes."""
-    backward = np.subtract(pose.position, pose.target)
-    backward = backward / np.linalg.norm(backward)
-    right = np.cross((0.0, 0.0, 1.0), backward)
-    right = right / np.linalg.norm(right)
-    return np.column_stack([right, np.cross(backward, right), backward])

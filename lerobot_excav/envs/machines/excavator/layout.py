@@ -9,6 +9,9 @@ from lerobot_excav.envs.soil import Container
 DIG_AREA_EXTENT_M = (6.0, 6.0)
 """Size of the soil grid along x and y [m], centred on the world origin."""
 
+SOIL_CELL_SIZE_M = 0.05
+"""Edge of a column of the soil grid [m] (kind: tuned; coarser columns make the cut jump)."""
+
 # 80 degrees to the left at the radius of the pile: a swing of usual length for loading a truck (kind: design).
 TARGET_BOX = Container(
     center_w=np.array([-3.75, 4.75, 0.0]), half_extent_m=np.array([1.1, 1.1]), wall_height_m=1.0, yaw_rad=0.0

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from lerobot_excav.envs.machines.camera_pictures import add_camera
 from lerobot_excav.envs.machines.excavator import bodywork, cameras, surfaces
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.bodywork import (
@@ -11,7 +12,6 @@ from lerobot_excav.envs.machines.excavator.bodywork import (
     SURROUNDINGS_GROUP,
     WORKING_BIT,
 )
-from lerobot_excav.envs.machines.excavator.cameras import CameraPose
 from lerobot_excav.envs.machines.excavator.grains import add_grains
 from lerobot_excav.envs.machines.excavator.load_picture import add_load
 from lerobot_excav.envs.soil.container import Container
@@ -95,8 +95,8 @@ def _add_ground(spec: mujoco.MjSpec) -> None:
         material="ground",
     )
     world.add_light(name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False)
-    _add_camera(world, "main", cameras.MAIN)
-    _add_camera(world, "overview", cameras.OVERVIEW)
+    add_camera(world, "main", cameras.MAIN)
+    add_camera(world, "overview", cameras.OVERVIEW)
 
 
 def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
@@ -153,8 +153,8 @@ def _add_machine(spec: mujoco.MjSpec) -> None:
     )  # fmt: skip
     bucket.add_site(name="cutting_edge", pos=[const.BUCKET_LENGTH_M, 0.0, 0.0], group=5)
     _add_payload(bucket)
-    _add_camera(house, "cab", cameras.CAB)
-    _add_camera(house, "side", cameras.SIDE)
+    add_camera(house, "cab", cameras.CAB)
+    add_camera(house, "side", cameras.SIDE)
     bodywork.dress_undercarriage(carrier)
     bodywork.dress_house(house)
     bodywork.dress_boom(boom)
@@ -211,9 +211,3 @@ def _add_payload(bucket: mujoco.MjsBody) -> None:
     # changes of `body_ipos` are ignored.
     payload.mass, payload.ipos, payload.inertia = 1.0, list(const.BUCKET_COM_T), [1.0, 1.0, 1.0]
     payload.explicitinertial = True
-
-
-def _add_camera(body: mujoco.MjsBody, name: str, pose: CameraPose) -> None:
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, cameras.axes(pose).ravel())
-    body.add_camera(name=name, pos=list(pose.position), quat=quat.tolist(), fovy=pose.fovy_deg)

@@ -7,27 +7,30 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
-from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture
-from lerobot_excav.envs.soil import Soil
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.machines.pinhole import PinholeCamera
 
 CAMERAS = ("main", "cab", "overview", "side")
 _MAX_GEOMS = 300
 
 
 class WorksiteRenderer:
-    """Draws a machine and its soil into images.
+    """Draws a worksite as it is when a picture is asked for.
 
-    The graphics context is made with the first picture, in the process that asks for it.
+    The graphics context is made with the first picture, in the process that asks for it. Every method that draws raises
+    `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics context can be made or the
+    renderer was closed.
 
     Args:
-        machine: The machine; its current state is drawn.
+        worksite: Machine, soil and target box.
         height: Image height H [px].
         width: Image width W [px].
     """
 
-    def __init__(self, machine: ExcavatorMachine, *, height: int, width: int) -> None:
-        self._machine = machine
+    def __init__(self, worksite: Worksite, *, height: int, width: int) -> None:
+        self._worksite = worksite
+        machine = worksite.machine
         self._soil_picture = SoilPicture(machine)
         self._pictures = CameraPictures(
             machine.model, machine.data, cameras=CAMERAS, height=height, width=width, max_geoms=_MAX_GEOMS
@@ -35,43 +38,33 @@ class WorksiteRenderer:
         self._all: Any = visible_groups(SURROUNDINGS_GROUP, MACHINE_GROUP, LOOSE_SOIL_GROUP)
         self._without_machine: Any = visible_groups(SURROUNDINGS_GROUP)
 
-    def render(self, camera: str, soil: Soil) -> NDArray[np.uint8]:
+    def render(self, camera: str) -> NDArray[np.uint8]:
         """Return a colour picture (H, W, 3), uint8.
 
         Args:
             camera: `main`, `cab`, `overview` or `side`.
-            soil: The soil to draw.
-
-        Raises:
-            ConfigurationError: There is no such camera.
-            RenderingError: No graphics context can be made, or the renderer was closed.
         """
-        self._soil_picture.update(soil)
+        self._soil_picture.update(self._worksite.soil)
         return self._pictures.colour(camera, self._all)
 
-    def depth(self, camera: str, soil: Soil) -> NDArray[np.float32]:
-        """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is.
-
-        Arguments and errors are those of `render`.
-        """
-        self._soil_picture.update(soil)
+    def depth_m(self, camera: str) -> NDArray[np.float32]:
+        """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is."""
+        self._soil_picture.update(self._worksite.soil)
         return self._pictures.distance_m(camera, self._all).astype(np.float32)
 
-    def terrain_points_w(self, soil: Soil) -> NDArray[np.float64]:
-        """Return the point of the soil surface that every pixel of `main` sees once the machine is gone.
+    def camera(self, camera: str) -> PinholeCamera:
+        """Return where a camera stands now, and how it projects."""
+        return self._pictures.pinhole(camera)
 
-        Args:
-            soil: The soil to look at.
+    def terrain_points_w(self) -> NDArray[np.float64]:
+        """Return the point of the soil surface that every pixel of `main` sees once the machine is gone.
 
         Returns:
             World points (H, W, 3) [m]; NaN where the pixel shows no soil of the dig area.
-
-        Raises:
-            RenderingError: No graphics context can be made, or the renderer was closed.
         """
-        self._soil_picture.update(soil)
+        self._soil_picture.update(self._worksite.soil)
         points_w = self._pictures.points_w("main", self._without_machine)
-        half_x, half_y = 0.5 * np.asarray(self._machine.terrain_shape_m)
+        half_x, half_y = 0.5 * np.asarray(self._worksite.machine.terrain_shape_m)
         inside = (np.abs(points_w[..., 0]) <= half_x) & (np.abs(points_w[..., 1]) <= half_y)
         points_w[~inside] = np.nan
         return points_w

@@ -3,18 +3,18 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.constants import TICK_S
-from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.soil import Reaction, Soil, Tool
-from lerobot_excav.envs.tasks.scoop.scene import SOIL_CELL_SIZE_M, Scene
+from lerobot_excav.envs.soil import Reaction, Soil, SoilParameters, Tool
 
 
 class Worksite:
     """Machine, soil and target box.
 
     Args:
-        soil: Name of the soil preset.
+        soil: Name of the soil preset, or parameters of one's own.
         fidelity: Numerical effort of the soil: `fast`, `standard` or `fine`.
 
     Attributes:
@@ -24,7 +24,7 @@ class Worksite:
         reaction: What the soil did to the bucket in the last tick; None before the first one.
     """
 
-    def __init__(self, *, soil: str = "sand", fidelity: str = "standard") -> None:
+    def __init__(self, *, soil: str | SoilParameters = "sand", fidelity: str = "standard") -> None:
         self.machine = ExcavatorMachine(container=TARGET_BOX, terrain_shape_m=DIG_AREA_EXTENT_M)
         self.soil = Soil(
             preset=soil,
@@ -37,11 +37,23 @@ class Worksite:
         self.reaction: Reaction | None = None
         self._ticks = 0
 
-    def reset(self, scene: Scene) -> None:
-        """Restore the start of a scene exactly."""
-        self.machine.set_appearance(scene.appearance)
-        self.machine.reset(scene.joint_pos)
-        self.soil.reset(scene.heights_m)
+    def reset(
+        self,
+        *,
+        joint_pos: NDArray[np.float64],
+        heights_m: NDArray[np.float64],
+        appearance: Appearance,
+    ) -> None:
+        """Start again, exactly.
+
+        Args:
+            joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+            heights_m: Soil above the floor [m], shape (nx, ny).
+            appearance: Colours and light.
+        """
+        self.machine.set_appearance(appearance)
+        self.machine.reset(joint_pos)
+        self.soil.reset(heights_m)
         self._ticks, self.time_s = 0, 0.0
         self.reaction = None
 

@@ -3,10 +3,10 @@
 Positions follow the published scene of the same task where they say so.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.pinhole import CameraPose
 
 BASE_POS_W = (0.5, 0.5, 0.0)
 """Foot of the arm, not turned: it works towards -x (kind: paper)."""
@@ -28,14 +28,6 @@ BLOCK_YAW_RAD = 0.1  # largest turn of a block about z (kind: guess)
 TRAY_POS_W = (0.42, 0.75)
 TRAY_RADIUS_M, TRAY_HEIGHT_M = 0.08, 0.02  # kind: paper
 TRAY_RIM_M = 0.012  # height of the rim above the tray's floor (kind: guess)
-
-
-class CameraPose(NamedTuple):
-    """A fixed camera: where it stands, what it looks at [m], and its vertical field of view [deg]."""
-
-    pos_w: tuple[float, float, float]
-    look_at_w: tuple[float, float, float]
-    fovy_deg: float
 
 
 # The published cameras stand here, for pictures of 480 x 640; at 96 x 128 a block would be four pixels wide. Both look

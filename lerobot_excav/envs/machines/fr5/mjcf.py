@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from lerobot_excav.envs.machines.camera_pictures import add_camera
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.arm import add_arm
@@ -30,7 +31,7 @@ def build_model() -> mujoco.MjModel:
         _add_block(spec, i)
     add_gripper(spec, add_arm(spec, layout.BASE_POS_W))
     for name, pose in layout.CAMERAS.items():
-        _add_camera(spec, name, pose)
+        add_camera(spec.worldbody, name, pose)
     return spec.compile()
 
 
@@ -115,18 +116,6 @@ def _add_block(spec: mujoco.MjSpec, i: int) -> None:
         solref=HARD_SOLREF,
         **_collision(BLOCK),
     )
-
-
-def _add_camera(spec: mujoco.MjSpec, name: str, pose: layout.CameraPose) -> None:
-    backward = np.array(pose.pos_w) - np.array(pose.look_at_w)
-    backward /= np.linalg.norm(backward)
-    # A camera that looks straight down has no horizon; then -x is up, the way the arm reaches.
-    up = np.array([0.0, 0.0, 1.0]) if abs(backward[2]) < 0.99 else np.array([-1.0, 0.0, 0.0])
-    right = np.cross(up, backward)
-    right /= np.linalg.norm(right)
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(backward, right), backward], axis=1).ravel())
-    spec.worldbody.add_camera(name=name, pos=list(pose.pos_w), quat=quat.tolist(), fovy=pose.fovy_deg)
 
 
 def _collision(kind: Kind) -> dict[str, int]:

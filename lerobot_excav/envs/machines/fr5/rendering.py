@@ -7,6 +7,7 @@ from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.geoms import ARM, BLOCK, CELL
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
+from lerobot_excav.envs.machines.pinhole import PinholeCamera
 
 _MAX_GEOMS = 100
 
@@ -46,22 +47,25 @@ class WorkcellRenderer:
         """
         return self._pictures.colour(camera, self._all)
 
-    def depth(self, camera: str) -> NDArray[np.float32]:
+    def depth_m(self, camera: str) -> NDArray[np.float32]:
         """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is.
 
         Arguments and errors are those of `render`.
         """
         return self._pictures.distance_m(camera, self._all).astype(np.float32)
 
-    def block_masks(self) -> NDArray[np.uint8]:
-        """Return the pixels of `main` that show each block once the arm is gone, (4, H, W, 3) of {0, 255}, uint8.
+    def camera(self, camera: str) -> PinholeCamera:
+        """Return where a camera stands, and how it projects."""
+        return self._pictures.pinhole(camera)
+
+    def block_pixels(self) -> NDArray[np.bool_]:
+        """Return the pixels of `main` that show each block once the arm is gone, (4, H, W) bool.
 
         Raises:
             RenderingError: No graphics context can be made, or the renderer was closed.
         """
         shown = self._pictures.geoms("main", self._without_arm)
-        masks = np.where(shown == self._block_geoms[:, None, None], 255, 0).astype(np.uint8)
-        return np.repeat(masks[..., None], 3, axis=-1)
+        return np.asarray(shown == self._block_geoms[:, None, None])
 
     def close(self) -> None:
         """Free the graphics context; the renderer cannot be used afterwards."""

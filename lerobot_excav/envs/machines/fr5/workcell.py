@@ -8,17 +8,15 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5 import layout
+from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW
 from lerobot_excav.envs.machines.fr5.geoms import ARM
+from lerobot_excav.envs.machines.fr5.look import WorkcellLook
 from lerobot_excav.envs.machines.fr5.mjcf import build_model
-from lerobot_excav.envs.tasks.grasp.scene import GraspScene
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
-ACTION_SIZE = 7  # six joint position targets [rad], gripper target [0..1]
+ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper target [0..1]
 _SUBSTEPS = round(const.CONTROL_TICK_S / const.SUBSTEP_S)
 _SETTLE_TICKS = 10  # 0.2 s, for blocks to find their contact with the table
-
-ACTION_LOW = np.append(const.JOINT_LIMITS_RAD[:, 0], 0.0)
-ACTION_HIGH = np.append(const.JOINT_LIMITS_RAD[:, 1], 1.0)
 
 _CTRL_SCALE = np.append(
     np.ones(6), const.FINGER_STROKE_M
@@ -54,23 +52,33 @@ class Workcell:
         self._pads = {self.model.geom(f"{name}_pad").id: i for i, name in enumerate(const.FINGER_NAMES)}
         self._reference: NDArray[np.float64] = np.zeros(ACTION_SIZE)
 
-    def reset(self, scene: GraspScene) -> None:
-        """Put the cell into a scene's starting state, at rest.
+    def reset(
+        self,
+        *,
+        joint_pos: NDArray[np.float64],
+        block_pos_w: NDArray[np.float64],
+        block_yaw: NDArray[np.float64],
+        look: WorkcellLook,
+    ) -> None:
+        """Put the cell into a starting state, at rest.
 
         Args:
-            scene: The scene.
+            joint_pos: Joint positions of the arm [rad], (6,).
+            block_pos_w: Centres of the blocks [m], (4, 3), world frame.
+            block_yaw: Turn of the blocks about z [rad], (4,).
+            look: Colours and light.
         """
         mujoco.mj_resetData(self.model, self.data)
-        self._paint(scene)
-        for i, (position_w, yaw) in enumerate(zip(scene.block_pos_w, scene.block_yaw, strict=True)):
+        self._paint(look)
+        for i, (position_w, yaw) in enumerate(zip(block_pos_w, block_yaw, strict=True)):
             start = self._block_qpos[i]
             self.data.qpos[start : start + 7] = [*position_w, np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]
-        self.data.qpos[self._qpos[:6]] = scene.joint_pos
+        self.data.qpos[self._qpos[:6]] = joint_pos
         self.data.qpos[self._qpos[6:]] = const.FINGER_STROKE_M
-        self._reference = np.append(scene.joint_pos, 1.0)
+        self._reference = np.append(joint_pos, 1.0)
         mujoco.mj_forward(self.model, self.data)
         for _ in range(_SETTLE_TICKS):
-            self.tick(np.append(scene.joint_pos, 1.0))
+            self.tick(np.append(joint_pos, 1.0))
         self.data.time = 0.0
 
     def tick(self, action: NDArray[np.float64]) -> None:
@@ -175,9 +183,9 @@ class Workcell:
         self._reference[:6] = np.clip(self._reference[:6], low, high)
         self.data.ctrl[:] = self._reference * _CTRL_SCALE
 
-    def _paint(self, scene: GraspScene) -> None:
-        for i, rgb in enumerate(scene.block_rgb):
+    def _paint(self, look: WorkcellLook) -> None:
+        for i, rgb in enumerate(look.block_rgb):
             self.model.geom(f"block{i}").rgba = [*rgb, 1.0]
-        self.model.geom("table").rgba = [*scene.table_rgb, 1.0]
+        self.model.geom("table").rgba = [*look.table_rgb, 1.0]
         lamp = self.model.light("lamp")
-        lamp.dir, lamp.diffuse = scene.light_dir_w, [scene.light] * 3
+        lamp.dir, lamp.diffuse = look.light_dir_w, [look.light] * 3

@@ -183,23 +183,15 @@ def find_pairs(
     new.closed[:count] = 0
     new.springs[:count] = 0.0
     new.anchors[:n] = positions
-    _remember(
-        old_rows,
-        (old.start, old.partner, old.closed, old.springs),
-        (new.start, new.partner, new.closed, new.springs),
-    )
+    _remember(old_rows, old, new)
     return new
 
 
 @kernel
-def _remember(
-    old_rows: Indices,
-    old: tuple[Indices, Indices, NDArray[np.uint8], Array],
-    new: tuple[Indices, Indices, NDArray[np.uint8], Array],
-) -> None:
+def _remember(old_rows: Indices, old: Pairs, new: Pairs) -> None:
     """Copy the memory of closed contacts from the old list."""
-    old_start, old_partner, old_closed, old_springs = old
-    start, partner, closed, springs = new
+    old_start, old_partner, old_closed, old_springs = old.start, old.partner, old.closed, old.springs
+    start, partner, closed, springs = new.start, new.partner, new.closed, new.springs
     for i in range(len(old_rows)):
         row = old_rows[i]
         if row < 0:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any, override
 
 from lerobot_excav.envs.machines.fr5.layout import NO_BLOCK
-from lerobot_excav.envs.tasks.grasp.task import TASK_STATE_NAMES
+from lerobot_excav.envs.tasks.grasp.spec import TASK_STATE_NAMES
 from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
 
 if TYPE_CHECKING:
@@ -19,14 +19,12 @@ class GraspRecord(EpisodeRecord):
     Attributes:
         episode_return: Sum of the rewards.
         first_grasped_block: First block that the fingers lifted since the last command; -1 if they lifted none.
-        shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none, None if there was no mask.
         target_in_tray: Whether the commanded block rests in the tray.
         blocks_in_tray: How many blocks do.
     """
 
     episode_return: float
     first_grasped_block: int
-    shown_block: int | None
     target_in_tray: bool
     blocks_in_tray: int
 
@@ -50,9 +48,9 @@ class GraspRecord(EpisodeRecord):
     @property
     def mask_followed(self) -> bool | None:
         """Of episodes that grasped a block and whose mask showed one: whether they are the same."""
-        if not self.has_grasped or self.shown_block in (None, NO_BLOCK):
+        if not self.has_grasped or self.shown_target_id == NO_BLOCK:
             return None
-        return self.first_grasped_block == self.shown_block
+        return self.first_grasped_block == self.shown_target_id
 
     @property
     def placed(self) -> bool | None:

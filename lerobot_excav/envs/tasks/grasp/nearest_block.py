@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.layout import BASE_POS_W
-from lerobot_excav.envs.tasks.grasp.scene import GraspScene
+from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
 
 
 def nearest_block(scene: GraspScene) -> int:
@@ -16,6 +16,11 @@ def nearest_block(scene: GraspScene) -> int:
     """
     offset_w = scene.block_pos_w[:, :2] - grasp_pos_w(scene.joint_pos)[:2]
     return int(np.argmin(np.hypot(*offset_w.T)))
+
+
+def nearest_target(scene_set: str, scene_id: int) -> int:
+    """Return the target of a scene that is nearest at the start; it is named by its number."""
+    return nearest_block(draw_scene(scene_set, scene_id))
 
 
 def grasp_pos_w(joint_pos: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.constants import HOME_JOINT_POS
+from lerobot_excav.envs.machines.fr5.look import WorkcellLook
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.errors import ExcavError, require, require_choice
 
@@ -38,10 +39,7 @@ class GraspScene:
         scene_id: Number within the set.
         block_pos_w: Centres of the blocks [m], (4, 3), world frame; the block with index i is target i.
         block_yaw: Turn of the blocks about z [rad], (4,).
-        block_rgb: Colours of the blocks, drawn apart from their places, (4, 3).
-        table_rgb: Colour of the table, (3,).
-        light_dir_w: Direction of the light, (3,).
-        light: Brightness of the light, 0 to 1.
+        look: Colours and light; the colours of the blocks are drawn apart from their places.
         joint_pos: Joint positions of the arm [rad], (6,).
     """
 
@@ -49,10 +47,7 @@ class GraspScene:
     scene_id: int
     block_pos_w: NDArray[np.float64]
     block_yaw: NDArray[np.float64]
-    block_rgb: NDArray[np.float64]
-    table_rgb: NDArray[np.float64]
-    light_dir_w: NDArray[np.float64]
-    light: float
+    look: WorkcellLook
     joint_pos: NDArray[np.float64]
 
 
@@ -72,19 +67,29 @@ def draw_scene(scene_set: str, scene_id: int) -> GraspScene:
     # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
     place_rng, look_rng, pose_rng = (np.random.default_rng(s) for s in stream.spawn(3))
-    tilt = look_rng.uniform(-0.4, 0.4, size=2)
-    arrays = {
-        "block_pos_w": _draw_block_pos_w(place_rng),
-        "block_yaw": place_rng.uniform(-layout.BLOCK_YAW_RAD, layout.BLOCK_YAW_RAD, size=layout.BLOCK_COUNT),
-        "block_rgb": look_rng.permutation(BLOCK_COLOURS)[: layout.BLOCK_COUNT],
-        "table_rgb": np.full(3, look_rng.uniform(0.55, 0.8)) + look_rng.uniform(-0.04, 0.04, size=3),
-        "light_dir_w": np.append(tilt, -1.0) / np.linalg.norm(np.append(tilt, -1.0)),
-        "joint_pos": HOME_JOINT_POS + pose_rng.normal(0.0, HOME_SPREAD_RAD, size=HOME_JOINT_POS.shape),
-    }
-    for array in arrays.values():
+    block_pos_w = _draw_block_pos_w(place_rng)
+    block_yaw = place_rng.uniform(-layout.BLOCK_YAW_RAD, layout.BLOCK_YAW_RAD, size=layout.BLOCK_COUNT)
+    joint_pos = HOME_JOINT_POS + pose_rng.normal(0.0, HOME_SPREAD_RAD, size=HOME_JOINT_POS.shape)
+    look = _draw_look(look_rng)
+    for array in (block_pos_w, block_yaw, joint_pos, look.block_rgb, look.table_rgb, look.light_dir_w):
         array.flags.writeable = False
     return GraspScene(
-        scene_set=scene_set, scene_id=scene_id, light=float(look_rng.uniform(0.5, 0.8)), **arrays
+        scene_set=scene_set,
+        scene_id=scene_id,
+        block_pos_w=block_pos_w,
+        block_yaw=block_yaw,
+        look=look,
+        joint_pos=joint_pos,
+    )
+
+
+def _draw_look(rng: np.random.Generator) -> WorkcellLook:
+    tilt = rng.uniform(-0.4, 0.4, size=2)
+    return WorkcellLook(
+        block_rgb=rng.permutation(BLOCK_COLOURS)[: layout.BLOCK_COUNT],
+        table_rgb=np.full(3, rng.uniform(0.55, 0.8)) + rng.uniform(-0.04, 0.04, size=3),
+        light_dir_w=np.append(tilt, -1.0) / np.linalg.norm(np.append(tilt, -1.0)),
+        light=float(rng.uniform(0.5, 0.8)),
     )
 
 

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
-from lerobot_excav.envs.tasks.grasp.scene import GraspScene
 from lerobot_excav.errors import require
 
 LIFT_M = 0.02
@@ -17,20 +16,6 @@ REST_SPEED_M_S = 0.05
 REST_HEIGHT_TOLERANCE_M = 0.011
 """A block in the tray lies flat or leans on the rim: its centre is this close to its height when flat [m]. Leaning
 lifts it by up to 9.4 mm, lying on the rim by the rim's 12 mm (kind: tuned)."""
-
-TASK_STATE_NAMES = (
-    "target_height_m",
-    "gripper_to_target_m",
-    "target_to_tray_m",
-    "fingers_on_target",
-    "target_lifted",
-    "target_in_tray",
-    "blocks_in_tray",
-    "first_grasped_block",
-)
-"""Entries of `task_state`: centre of the commanded block above its place on the table [m], its distance from the grasp
-point [m] and from the tray's axis [m], pads that touch it [0..2], whether it is lifted by the fingers, whether it rests
-in the tray, released, how many blocks do so, and the first block that was lifted since the last command (-1: none)."""
 
 
 class GraspTask:
@@ -49,29 +34,24 @@ class GraspTask:
     The published experiment has the same maximum; its policies return 658 (96 % success) and 704 (50 of 50). The
     scripted operator's 400 frames return about 900 here, because it rests longer at the end.
 
+    Attributes:
+        target_id: Index of the block that is commanded now.
+
     Args:
-        workcell: Arm and blocks, already reset to the scene.
-        scene: The scene.
+        workcell: Arm and blocks, at the start of a scene.
         target_id: Index of the commanded block.
     """
 
-    def __init__(self, workcell: Workcell, scene: GraspScene, target_id: int) -> None:
-        self.scene = scene
+    def __init__(self, workcell: Workcell, target_id: int) -> None:
         self._workcell = workcell
-        self._commanded = [_checked_target(target_id)]
+        self.target_id = _checked_target(target_id)
         self._first_grasped = layout.NO_BLOCK
         self._return = 0.0
         self._max_reward = 0.0
-        self._frames = 0
         self._look()
 
-    @property
-    def target_id(self) -> int:
-        """Index of the block that is commanded now."""
-        return self._commanded[-1]
-
     def retarget(self, target_id: int) -> None:
-        """Command another block from now on; which block is grasped first is asked anew.
+        """Command another block from now on; which block is grasped first is asked again.
 
         Args:
             target_id: Index of the block.
@@ -79,7 +59,7 @@ class GraspTask:
         Raises:
             ConfigurationError: There is no such block.
         """
-        self._commanded.append(_checked_target(target_id))
+        self.target_id = _checked_target(target_id)
         self._first_grasped = layout.NO_BLOCK
 
     def update(self) -> float:
@@ -92,7 +72,6 @@ class GraspTask:
         reward = self._reward()
         self._return += reward
         self._max_reward = max(self._max_reward, reward)
-        self._frames += 1
         return reward
 
     @property
@@ -102,7 +81,7 @@ class GraspTask:
 
     @property
     def task_state(self) -> NDArray[np.float32]:
-        """State of the task, never an input of a policy, (8,) float32; see `TASK_STATE_NAMES`."""
+        """State of the task, never an input of a policy, (8,) float32; see `spec.TASK_STATE_NAMES`."""
         position_w = self._block_pos_w[self.target_id]
         values = (
             position_w[2] - layout.block_rest_height_m(),
@@ -116,15 +95,9 @@ class GraspTask:
         )
         return np.array(values, dtype=np.float32)
 
-    @property
-    def episode_metrics(self) -> dict[str, Any]:
-        """Outcome of the episode part by part."""
+    def metrics(self) -> dict[str, Any]:
+        """Return the outcome of the episode part by part, as it goes into the metrics file."""
         return {
-            "scene_set": self.scene.scene_set,
-            "scene_id": self.scene.scene_id,
-            "target_id": self._commanded[0],
-            "final_target_id": self.target_id,
-            "is_success": self.is_success,
             "episode_return": self._return,
             "max_reward": self._max_reward,
             "first_grasped_block": self._first_grasped,
@@ -132,7 +105,6 @@ class GraspTask:
             "blocks_in_tray": int(self._in_tray.sum()),
             "target_in_tray": bool(self._in_tray[self.target_id]),
             "released": not self._arm_touching[self.target_id],
-            "frames": self._frames,
         }
 
     def _look(self) -> None:

@@ -44,6 +44,12 @@ class DigCycle:
         """The commanded dig region."""
         return self.scene.targets[self.target_id]
 
+    def retarget(self, target_id: int) -> None:
+        """Command another dig region from now on; a region that was hit before counts no more."""
+        self.target_id = target_id
+        self.target_hit = self.onset_time_s = None
+        self._meter.retarget(self.target)
+
     @property
     def state(self) -> TaskState:
         """Running measurements."""

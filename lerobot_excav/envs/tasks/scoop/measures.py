@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
-from lerobot_excav.envs.tasks.scoop.task_state import TASK_STATE_NAMES
+from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 
 if TYPE_CHECKING:
     import pandas as pd

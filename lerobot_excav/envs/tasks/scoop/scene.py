@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.appearance import Appearance, draw_appearance
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
-from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
-from lerobot_excav.envs.soil import PRESETS
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M
+from lerobot_excav.envs.soil import PRESETS, SoilParameters
 from lerobot_excav.envs.tasks.scoop.pile import draw_pile
 from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets
-from lerobot_excav.envs.tasks.settings import SCENE_SETS, SOILS
+from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.errors import ExcavError, require, require_choice
-
-SOIL_CELL_SIZE_M = 0.05
 
 # Names this family of random streams; changing it changes every scene, so it changes with the scene's definition only.
 _STREAM = 0xE8CA8
@@ -29,7 +27,7 @@ class Scene:
     Attributes:
         scene_set: `train`, `val` or `test`; their random streams are disjoint.
         scene_id: Number within the set.
-        soil: Name of the soil preset.
+        soil: Name of the soil preset, or parameters of one's own.
         heights_m: Soil above the floor [m], shape (nx, ny).
         joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
         appearance: Colours and light.
@@ -38,7 +36,7 @@ class Scene:
 
     scene_set: str
     scene_id: int
-    soil: str
+    soil: str | SoilParameters
     heights_m: NDArray[np.float64]
     joint_pos: NDArray[np.float64]
     appearance: Appearance
@@ -53,7 +51,7 @@ def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @lru_cache(maxsize=8)
-def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
+def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "sand") -> Scene:
     """Draw a scene; the same arguments give the same scene, byte for byte.
 
     Drawing takes most of a reset, and the targets of a scene are played one after the other: the last scenes are kept.
@@ -62,7 +60,7 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
     Args:
         scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
         scene_id: Any integer from 0.
-        soil: Name of the soil preset, which sets slope and density of the pile.
+        soil: Name of the soil preset, or parameters, which set slope and density of the pile.
 
     Returns:
         The scene.
@@ -71,7 +69,8 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
         ConfigurationError: An argument is not one of the allowed values.
     """
     require_choice("scene_set", scene_set, SCENE_SETS)
-    require_choice("soil", soil, SOILS)
+    if isinstance(soil, str):
+        require_choice("soil", soil, tuple(PRESETS))
     require(scene_id >= 0, f"scene_id={scene_id} is negative; scenes are numbered from 0")
     # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
@@ -92,11 +91,11 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str = "sand") -> Scene:
 
 
 def _draw_pile_with_targets(
-    rng: np.random.Generator, soil: str
+    rng: np.random.Generator, soil: str | SoilParameters
 ) -> tuple[NDArray[np.float64], tuple[Target, ...]]:
     """Draw piles until one offers all its targets."""
     x_w, y_w = cell_centres_w()
-    parameters = PRESETS[soil]
+    parameters = PRESETS[soil] if isinstance(soil, str) else soil
     for _ in range(_PILE_TRIES):
         heights_m = draw_pile(
             rng, x_w=x_w, y_w=y_w, repose_tan=parameters.slope_tan, density_kg_m3=parameters.density_kg_m3

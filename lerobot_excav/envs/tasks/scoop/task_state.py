@@ -12,18 +12,8 @@ from lerobot_excav.envs.machines.excavator.layout import (
 )
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import Tool
+from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 from lerobot_excav.envs.tasks.scoop.targets import Target
-
-TASK_STATE_NAMES = (
-    "bucket_mass_kg",
-    "excavated_mass_kg",
-    "deposited_mass_kg",
-    "distance_to_target_m",
-    "distance_to_box_m",
-    "hard_target_contacts",
-    "bucket_depth_below_dig_plane_m",
-    "spill_before_target_events",
-)
 
 # Thresholds of the events (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
 HARD_CONTACT_FORCE_N = 5000.0
@@ -65,6 +55,11 @@ class TaskMeter:
         self._box_mass_start_kg = worksite.box_mass_kg
         self._in_hard_contact = False
         self.state = TaskState()
+        self._measure_places()
+
+    def retarget(self, target: Target) -> None:
+        """Measure the distance to another dig region from now on."""
+        self._target = target
         self._measure_places()
 
     def update(self) -> TaskState:

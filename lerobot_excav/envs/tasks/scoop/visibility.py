@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.excavator.cameras import CameraPose, axes
+from lerobot_excav.envs.machines.pinhole import CameraPose
 from lerobot_excav.envs.soil.compiled import kernel
 
 
@@ -38,7 +38,7 @@ def seen_area_px(
         np.broadcast_arrays(eye_w[0] - x_w[:, None], eye_w[1] - y_w[None, :], eye_w[2] - heights_m), axis=-1
     )
     area_vector = cell_size_m**2 * np.stack([-slope_x, -slope_y, np.ones_like(heights_m)], axis=-1)
-    depth_m = to_eye @ axes(pose)[:, 2]
+    depth_m = to_eye @ pose.axes[:, 2]
     focal_px = 0.5 * picture_height_px / np.tan(0.5 * np.radians(pose.fovy_deg))
     facing = np.maximum(0.0, np.sum(area_vector * to_eye, axis=-1))
     hidden = hidden_cells(heights_m, float(x_w[0]), float(y_w[0]), cell_size_m, eye_w)

@@ -1,5 +1,5 @@
 """The scripted operator of the arm."""
 
-from lerobot_excav.envs.tasks.grasp.operator.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.grasp.operator.operator import GraspOperator
 
-__all__ = ["ScriptedOperator"]
+__all__ = ["GraspOperator"]

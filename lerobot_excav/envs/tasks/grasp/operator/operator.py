@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.fr5.constants import CONTROL_TICK_S
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
 from lerobot_excav.envs.tasks.grasp.operator.inverse_kinematics import GripperKinematics
 from lerobot_excav.envs.tasks.grasp.operator.plan import PHASES, plan_grasp
@@ -26,7 +26,7 @@ class OperatedEnvironment(Protocol):
         """Index of the commanded block."""
 
 
-class ScriptedOperator:
+class GraspOperator:
     """Grasps the commanded block and puts it into the tray.
 
     It sees where the block lies and plans way-points, whose path inverse kinematics turns into joint position targets;
@@ -63,8 +63,8 @@ class ScriptedOperator:
         if env.target_id != self._target_id:
             self.reset(env)
         # Ticks of a frame are whole: the environment accepts no other frame rates.
-        for _ in range(round(1.0 / (CONTROL_TICK_S * env.fps))):
+        for _ in range(round(1.0 / (TICK_S * env.fps))):
             self._ticks += 1
-            command = self._plan.at(self._ticks * CONTROL_TICK_S)
+            command = self._plan.at(self._ticks * TICK_S)
             joint_pos = self._kinematics.joint_pos_at(command.grasp_pos_w, upright=command.upright)
         return np.append(joint_pos, command.opening).astype(np.float32)

@@ -37,14 +37,15 @@ class OperatedEnvironment(Protocol):
 
     @property
     def cycle(self) -> DigCycle:
-        """The running cycle, with its target."""
+        """The running cycle, with the target that is commanded now."""
 
 
-class ScriptedOperator:
+class DigOperator:
     """Digs the commanded target, issuing only joystick commands.
 
     It sees the true state of the worksite, plans the path of the bucket in cylinder coordinates around the swing axis
-    and follows it with rate commands. Style and tremor differ from cycle to cycle.
+    and follows it with rate commands. Style and tremor differ from cycle to cycle. A new command makes it plan again:
+    at once as long as it has not loaded, else when it has dumped what it carries.
 
     Args:
         rng: Source of style and tremor.
@@ -58,6 +59,7 @@ class ScriptedOperator:
         """Begin the running cycle of an environment with a newly drawn style."""
         self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
+        self._target_id = env.cycle.target_id
         self._cut = plan_cut(env.worksite.soil, env.cycle.target, self._variation)
         self._begin(0, env)
 
@@ -80,6 +82,8 @@ class ScriptedOperator:
         Returns:
             Swing, boom, arm, bucket in [-1, 1], shape (4,), float32.
         """
+        if env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest"):
+            self.reset(env)
         joint_pos = env.worksite.machine.joint_pos
         if self._phase_is_over(joint_pos, env):
             self._begin(self._phase + 1, env)

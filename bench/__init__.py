@@ -1,0 +1,1 @@
+"""Speed of this machine, films, and checks of the simulation against itself; not part of the wheel."""

@@ -1,0 +1,137 @@
+"""Corrupted masks: what a wrong or an imprecise mask does to a policy, asked of any source.
+
+Conditions test whether a policy obeys the mask; noise is the error that a segmentation makes.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.source import MaskSource, MaskView, Pixels, TargetMask
+from lerobot_excav.errors import ExcavError
+
+MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
+"""`correct`; `zero`: an empty mask; `random`: the same blob elsewhere in the picture, off its place; `mismatched`: the
+mask of another target."""
+
+MASK_NOISES = ("none", "shift", "erode", "dilate")
+"""`none`; `shift`: moved in a random direction, kept inside the picture; `erode`: without the pixels near its outside
+(city-block distance); `dilate`: with those near it."""
+
+_SHIFT_TRIES = 1000
+_STREAM = 0x3A5C  # names this family of random streams
+
+
+class CorruptedSource:
+    """Wraps a source: the same scene and target are always shown the same corruption.
+
+    Args:
+        source: Where the right masks come from.
+        condition: One of `MASK_CONDITIONS`.
+        noise: One of `MASK_NOISES`, added to what the condition shows.
+        noise_px: Size of the noise [px].
+    """
+
+    def __init__(self, source: MaskSource, *, condition: str, noise: str, noise_px: int) -> None:
+        self._source = source
+        self._condition, self._noise, self._noise_px = condition, noise, noise_px
+
+    def mask(self, view: MaskView, command: Command) -> TargetMask | None:
+        """Return the corrupted mask of a command.
+
+        Raises:
+            ExcavError: No other place is free for the blob of a `random` mask.
+        """
+        key = (*view.scene_key, command.target_id)
+        rng = np.random.default_rng(np.random.SeedSequence(_STREAM, spawn_key=key))
+        shown = self._under_condition(view, command, rng)
+        if shown is None or self._condition == "zero":
+            return shown
+        pixels = noisy_pixels(shown.pixels, self._noise, self._noise_px, rng)
+        parameters = {
+            **shown.parameters,
+            "condition": self._condition,
+            "noise": self._noise,
+            "noise_px": self._noise_px,
+        }
+        return replace(shown, pixels=pixels, parameters=parameters) if pixels.any() else None
+
+    def _under_condition(
+        self, view: MaskView, command: Command, rng: np.random.Generator
+    ) -> TargetMask | None:
+        if self._condition == "zero":
+            size = (view.camera.height, view.camera.width)
+            return TargetMask(pixels=np.zeros(size, dtype=bool), target_id=None, source="none")
+        if self._condition == "mismatched":
+            others = view.other_commands()
+            return self._source.mask(view, others[int(rng.choice(len(others)))])
+        mask = self._source.mask(view, command)
+        if mask is None or self._condition == "correct":
+            return mask
+        return replace(mask, pixels=moved_elsewhere(mask.pixels, rng), target_id=None)
+
+
+def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:
+    """Shift a blob inside the picture so that it does not overlap its old place.
+
+    Args:
+        inside: The blob, (H, W) bool.
+        rng: Source of the place.
+
+    Raises:
+        ExcavError: No other place is free for it.
+    """
+    rows, cols = np.nonzero(inside)
+    height, width = inside.shape
+    for _ in range(_SHIFT_TRIES):
+        row_shift = int(rng.integers(-rows.min(), height - rows.max()))
+        col_shift = int(rng.integers(-cols.min(), width - cols.max()))
+        moved = _shifted(inside, row_shift, col_shift)
+        if not np.any(moved & inside):
+            return moved
+    raise ExcavError(
+        f"mask_condition='random': no free place for a blob of {rows.size} pixels in {height} x {width}; "
+        "use larger observation_height and observation_width"
+    )
+
+
+def noisy_pixels(inside: Pixels, noise: str, size_px: int, rng: np.random.Generator) -> Pixels:
+    """Return a mask with the error of an imperfect segmentation; erosion may leave nothing.
+
+    Args:
+        inside: Right mask, (H, W) bool, not empty.
+        noise: One of `MASK_NOISES`.
+        size_px: Size of the error [px].
+        rng: Source of the direction of a shift.
+    """
+    if noise == "shift":
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        rows, cols = np.nonzero(inside)
+        height, width = inside.shape
+        row_shift = np.clip(round(size_px * np.sin(angle)), -rows.min(), height - 1 - rows.max())
+        col_shift = np.clip(round(size_px * np.cos(angle)), -cols.min(), width - 1 - cols.max())
+        return _shifted(inside, int(row_shift), int(col_shift))
+    if noise == "dilate":
+        return _grown(inside, size_px)
+    # Eroding the mask is dilating its outside; beyond the picture's edge lies neither.
+    return ~_grown(~inside, size_px) if noise == "erode" else inside.copy()
+
+
+def _shifted(inside: Pixels, row_shift: int, col_shift: int) -> Pixels:
+    moved = np.zeros_like(inside)
+    rows, cols = np.nonzero(inside)
+    moved[rows + row_shift, cols + col_shift] = True
+    return moved
+
+
+def _grown(inside: Pixels, size_px: int) -> Pixels:
+    """Add the four neighbours of every pixel, `size_px` times."""
+    for _ in range(size_px):
+        grown = inside.copy()
+        grown[1:] |= inside[:-1]
+        grown[:-1] |= inside[1:]
+        grown[:, 1:] |= inside[:, :-1]
+        grown[:, :-1] |= inside[:, 1:]
+        inside = grown
+    return inside

@@ -1,0 +1,390 @@
+"""The environment of every task: a command, shown as a mask of the main view, and a machine that is to obey it."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.constants import TICKS_PER_SECOND
+from lerobot_excav.envs.machines.pinhole import PinholeCamera
+from lerobot_excav.envs.machines.renderer import Renderer
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.overlay import tinted
+from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
+from lerobot_excav.envs.tasks.observation import OBS_TYPES, observation_space
+from lerobot_excav.envs.tasks.registry import task_spec
+from lerobot_excav.envs.tasks.selection import Selection, select_episode
+from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.errors import ConfigurationError, require_choice
+
+RENDER_MODES = ("rgb_array", None)
+
+NO_TARGET = -1
+"""What stands for none of the targets where an index is expected."""
+
+MASK_MISSING_LIMIT_S = 10.0
+"""How long a machine is held still while its mask source finds nothing [s]; then the episode is over (kind: guess)."""
+
+
+class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[Any]]):
+    """A machine in a scene, and a target that a mask of the main view commands.
+
+    A task is a subclass that says how a scene begins, how a frame passes, what the targets are and what is measured; the
+    rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
+
+    `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`; `reset(options={"scene_id": …, "target_id": …,
+    "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, and without `commands`
+    the task decides whether the command changes. A reset with nothing draws a scene.
+
+    Where the mask source finds nothing, the machine is held still until it does: `reset` and `step` pass as many frames
+    as that takes, and `mask_missing_frames` counts them. After `MASK_MISSING_LIMIT_S` the episode is given up:
+    `info["mask_missing"]` is true, no action is carried out any more, and the next `step` ends it.
+
+    Args:
+        task: Id of the task; that of the class by default.
+        obs_type: One of `OBS_TYPES`.
+        render_mode: `rgb_array` or None.
+        depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
+        settings: Fields of the task's `TaskSettings`, by name.
+
+    Raises:
+        ConfigurationError: A setting is unknown or has a value that is not possible.
+    """
+
+    TASK: ClassVar[str]
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": TICKS_PER_SECOND}  # noqa: RUF012 - gymnasium's contract
+
+    def __init__(
+        self,
+        *,
+        task: str | None = None,
+        obs_type: str = "pixels_agent_pos",
+        render_mode: str | None = "rgb_array",
+        depth_info: bool = False,
+        **settings: Any,
+    ) -> None:
+        self.task_spec = spec = task_spec("task", self.TASK if task is None else task)
+        self.settings = spec.make_settings(**settings)
+        require_choice("obs_type", obs_type, OBS_TYPES)
+        require_choice("render_mode", render_mode, RENDER_MODES)
+        self.task, self.task_description = spec.id, spec.description
+        self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
+        self.fps = self.settings.fps
+        self.episode_length = self.settings.episode_length or spec.length_at(self.fps)
+        self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
+        self.metadata = {**type(self).metadata, "render_fps": self.fps}
+        self.observation_space = observation_space(
+            obs_type,
+            size=self.settings.observation_size,
+            cameras=spec.cameras,
+            state_size=len(spec.state_names),
+        )
+        self.action_space = gym.spaces.Box(
+            np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
+        )
+        self._ticks_per_frame = TICKS_PER_SECOND // self.fps
+        self._source = CorruptedSource(
+            make_mask_source(self.settings.mask_source),
+            condition=self.settings.mask_condition,
+            noise=self.settings.mask_noise,
+            noise_px=self.settings.mask_noise_px,
+        )
+        self._world: World | None = None
+        self._renderer: Picture | None = None
+        self._selection: Selection | None = None
+        self._commands: list[Command] = []
+        self._mask: TargetMask | None = None
+        self._frame = self._missing_frames = 0
+        self._main_img: NDArray[np.uint8] | None = None
+
+    # What a task says of itself.
+
+    @abstractmethod
+    def _make_world(self) -> World:
+        """Make the machine and its surroundings."""
+
+    @abstractmethod
+    def _make_renderer(self, world: World, height: int, width: int) -> Picture:
+        """Make the renderer of the world."""
+
+    @abstractmethod
+    def _start(self, scene_id: int, target_id: int) -> None:
+        """Reset the world to a scene, and begin the task on one of its targets."""
+
+    @abstractmethod
+    def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
+        """Pass a frame; return the reward, and whether the task is over.
+
+        Raises:
+            ConfigurationError: The action has another shape or is not finite.
+        """
+
+    @abstractmethod
+    def _holding_action(self) -> NDArray[Any]:
+        """Return the action that holds the machine still."""
+
+    @abstractmethod
+    def _region(self, target_id: int) -> Any:
+        """Return the target of the scene with this index, as the task knows it."""
+
+    @abstractmethod
+    def true_mask(self, command: Command) -> Pixels:
+        """Return which pixels of `main` show the target of a command once the machine is gone, (H, W) bool."""
+
+    @property
+    @abstractmethod
+    def agent_pos(self) -> NDArray[np.float32]:
+        """What the policy feels of the machine, (states,) float32."""
+
+    @property
+    @abstractmethod
+    def task_state(self) -> NDArray[np.float32]:
+        """How far the task is, (k,) float32; never an input of a policy."""
+
+    @property
+    @abstractmethod
+    def is_success(self) -> bool:
+        """Whether the task has succeeded by now; counts only when the decision is final."""
+
+    @abstractmethod
+    def _measures(self) -> dict[str, Any]:
+        """Return the outcome part by part, as it goes into the metrics file."""
+
+    def _next_target(self) -> int | None:
+        """Return the target that the task commands from this frame on; None leaves the command as it is."""
+        return None
+
+    def _begin_command(self, target_id: int) -> None:
+        """Take note that another target is commanded."""
+
+    # What every task shares.
+
+    @property
+    def world(self) -> World:
+        """The machine and its surroundings; built at first use, so that vector workers build their own."""
+        if self._world is None:
+            self._world = self._make_world()
+        return self._world
+
+    @property
+    def renderer(self) -> Picture:
+        """Camera pictures of the world; the graphics context is made at first use."""
+        if self._renderer is None:
+            self._renderer = self._make_renderer(self.world, *self.settings.observation_size)
+        return self._renderer
+
+    @property
+    def command(self) -> Command:
+        """What is commanded now.
+
+        Raises:
+            ConfigurationError: The environment has not been reset.
+        """
+        self._require_episode()
+        return self._commands[-1]
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """All commands of the episode, the first at frame 0."""
+        return tuple(self._commands)
+
+    @property
+    def scene_id(self) -> int:
+        """Scene of the running episode."""
+        return self._require_episode().scene_id
+
+    @property
+    def target_id(self) -> int:
+        """Index of the target that is commanded now."""
+        return self.command.target_id
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start an episode; see the class for how seed and options select what is played.
+
+        Args:
+            seed: Selects scene and target. A corrupted mask and a second target depend on these alone.
+            options: May hold `scene_id`, `target_id` and `commands`, and LeRobot's own keys (`lerobot_…`).
+
+        Returns:
+            Observation and info.
+
+        Raises:
+            ConfigurationError: An option is unknown or has a value that is not possible.
+        """
+        super().reset(seed=seed)
+        selection = select_episode(
+            seed, options or {}, rng=self.np_random, target_count=self.task_spec.target_count
+        )
+        self._selection = selection
+        self._start(selection.scene_id, selection.target_id)
+        self._frame = self._missing_frames = 0
+        self._commands, self._main_img = [], None
+        self._give_command(selection.target_id)
+        self._wait_for_mask()
+        return self._observe(), self._info(is_over=False)
+
+    def step(self, action: NDArray[Any]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Advance by one frame (1/fps s); see the class of the task for action, reward and termination.
+
+        Raises:
+            ConfigurationError: The action has another shape than that of `action_space`, or is not finite.
+        """
+        self._require_episode()
+        reward, terminated = 0.0, False
+        if not self.mask_missing:
+            reward, terminated = self._advance(action)
+            self._frame += 1
+            self._main_img = None
+            self._change_command()
+            held_reward, held_terminated = self._wait_for_mask()
+            reward, terminated = reward + held_reward, terminated or held_terminated
+        frames = self._frame + self._missing_frames
+        truncated = (self.mask_missing or frames >= self.episode_length) and not terminated
+        info = self._info(is_over=terminated or truncated)
+        return self._observe(), float(reward), terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the main view (H, W, 3) uint8 as it is, or None without a render mode."""
+        return None if self.render_mode is None else self.picture()
+
+    def close(self) -> None:
+        """Free the graphics context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = self._main_img = None
+
+    # What a mask source may look at.
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """Where the main camera stands, and how it projects."""
+        return self.renderer.camera("main")
+
+    @property
+    def scene_key(self) -> tuple[int, int]:
+        """Numbers of the scene set and of the scene."""
+        return SCENE_SETS.index(self.settings.scene_set), self.scene_id
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the main picture, (H, W, 3) uint8; drawn once per frame, for LeRobot's videos ask for it again."""
+        if self._main_img is None:
+            self._main_img = self.renderer.render("main")
+        return self._main_img.copy()
+
+    def depth_m(self) -> NDArray[np.float32]:
+        """Return the depth image registered with `main`, (H, W) float32 [m along the optical axis]."""
+        return self.renderer.depth_m("main")
+
+    def other_commands(self) -> list[Command]:
+        """Return what else could be commanded in this scene, in the order of the targets."""
+        others = [i for i in range(self.task_spec.target_count) if i != self.target_id]
+        return [Command(target_id=i, region=self._region(i), since_frame=self._frame) for i in others]
+
+    # The command and its mask.
+
+    @property
+    def mask(self) -> TargetMask | None:
+        """The mask of the command, as shown; None if nothing was found, or pictures are left out."""
+        return self._mask
+
+    @property
+    def mask_missing(self) -> bool:
+        """Whether nothing was found for the command, so that no action is carried out."""
+        return self._shows_pixels and self._mask is None
+
+    def _give_command(self, target_id: int) -> None:
+        command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
+        self._commands.append(command)
+        self._mask = self._source.mask(self, command) if self._shows_pixels else None
+
+    def _change_command(self) -> None:
+        """Give the next command if it is time for one."""
+        schedule = self._require_episode().schedule
+        if schedule is None:
+            target_id = self._next_target()
+        else:
+            target_id = dict(schedule).get(self._frame)
+        if target_id is not None:
+            self._begin_command(target_id)
+            self._give_command(target_id)
+
+    def _wait_for_mask(self) -> tuple[float, bool]:
+        """Hold the machine still until there is a mask, within limits; return the reward, and whether it is over."""
+        reward, terminated, patience = 0.0, False, round(MASK_MISSING_LIMIT_S * self.fps)
+        while (
+            self.mask_missing
+            and not terminated
+            and patience > 0
+            and self._frame + self._missing_frames < self.episode_length
+        ):
+            gain, terminated = self._advance(self._holding_action())
+            reward += gain
+            patience -= 1
+            self._missing_frames += 1
+            self._main_img = None
+            self._mask = self._source.mask(self, self.command)
+        return reward, terminated
+
+    # What is shown and told.
+
+    @property
+    def _shows_pixels(self) -> bool:
+        return self.obs_type == "pixels_agent_pos"
+
+    def _observe(self) -> dict[str, Any]:
+        observation: dict[str, Any] = {"agent_pos": self.agent_pos}
+        if self._shows_pixels:
+            observation["pixels"] = {camera: self._draw(camera) for camera in self.task_spec.cameras}
+        return observation
+
+    def _draw(self, camera: str) -> NDArray[np.uint8]:
+        if camera == "target_mask":
+            empty = np.zeros((*self.settings.observation_size, 3), np.uint8)
+            return empty if self._mask is None else self._mask.img
+        if camera != "main":
+            return self.renderer.render(camera)
+        picture = self.picture()
+        overlay = self.settings.target_overlay and self._mask is not None
+        return tinted(picture, self._mask.pixels) if overlay else picture
+
+    def _info(self, *, is_over: bool) -> dict[str, Any]:
+        info = {
+            "is_success": is_over and self.is_success,
+            "task_state": self.task_state,
+            "scene_id": self.scene_id,
+            "target_id": self.target_id,
+            "mask_missing": self.mask_missing,
+        }
+        if self.depth_info:
+            info["depth_m"] = self.depth_m()
+        if is_over:
+            info["episode_metrics"] = self._episode_metrics()
+        return info
+
+    def _episode_metrics(self) -> dict[str, Any]:
+        shown = self._mask.target_id if self._mask is not None else None
+        return {
+            "simulation_version": self.task_spec.simulation_version,
+            **{name: value for name, value in self.settings.as_dict().items() if value is not None},
+            "episode_length": self.episode_length,
+            "scene_id": self.scene_id,
+            "target_id": self._commands[0].target_id,
+            "commands": [[command.since_frame, command.target_id] for command in self._commands],
+            "shown_target_id": NO_TARGET if shown is None else shown,
+            "mask_missing": self.mask_missing,
+            "mask_missing_frames": self._missing_frames,
+            "is_success": self.is_success,
+            "frames": self._frame,
+            **self._measures(),
+        }
+
+    def _require_episode(self) -> Selection:
+        if self._selection is None:
+            raise ConfigurationError("the environment has no episode yet; call reset() first")
+        return self._selection

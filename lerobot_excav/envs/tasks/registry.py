@@ -1,0 +1,94 @@
+"""The tasks: the only list of them.
+
+A package of one's own adds a task with `register_task`; environments, recordings, checks and reports then have it.
+"""
+
+from importlib.metadata import entry_points
+
+import gymnasium as gym
+
+from lerobot_excav.envs.tasks.grasp.spec import GRASP
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.envs.tasks.setting import declared_settings
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.errors import DatasetError, require, require_choice
+
+TASKS: dict[str, TaskSpec] = {}
+"""Tasks by their id."""
+
+
+def register_task(spec: TaskSpec) -> None:
+    """Add a task, and register it with Gymnasium; adding the same one again changes nothing.
+
+    Raises:
+        ConfigurationError: Another task has this id.
+    """
+    known = TASKS.setdefault(spec.id, spec)
+    require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
+    # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
+    gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
+
+
+def load_plugins() -> None:
+    """Import what installed packages name as entry points of the group `lerobot_excav.plugins`; each registers its tasks."""
+    for entry_point in entry_points(group="lerobot_excav.plugins"):
+        entry_point.load()
+
+
+def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:
+    """Return a task.
+
+    Args:
+        field: What the user gave its id for.
+        task_id: Its id.
+        env_type: Environment that it has to be of; None: any.
+
+    Raises:
+        ConfigurationError: There is no such task.
+    """
+    known = tuple(id for id, spec in TASKS.items() if env_type in (None, spec.env_type))
+    require_choice(field, task_id, known, hint="A task is a gym id without the part before the slash.")
+    return TASKS[str(task_id)]
+
+
+def task_of_settings(settings: TaskSettings) -> TaskSpec:
+    """Return the task that settings name.
+
+    Raises:
+        ConfigurationError: Their environment has no such task.
+    """
+    return task_spec(f"{settings.PREFIX}task", settings.task, env_type=settings.ENV_TYPE)
+
+
+def task_settings(config: TaskSettings) -> TaskSettings:
+    """Return the settings alone of a configuration of LeRobot that is made of them."""
+    kind = task_of_settings(config).settings
+    return kind(**{name: getattr(config, name) for name in declared_settings(kind)})
+
+
+def env_types() -> dict[str, TaskSpec]:
+    """Return the environments by `--env.type`, each with its first task."""
+    types: dict[str, TaskSpec] = {}
+    for spec in TASKS.values():
+        types.setdefault(spec.env_type, spec)
+    return types
+
+
+def task_of_robot(robot_type: str | None) -> TaskSpec:
+    """Return the first task of the robot that a dataset was recorded with; all tasks of a robot share its columns.
+
+    Raises:
+        DatasetError: It was recorded with another robot.
+    """
+    for spec in TASKS.values():
+        if spec.robot_type == robot_type:
+            return spec
+    known = ", ".join(dict.fromkeys(repr(spec.robot_type) for spec in TASKS.values()))
+    raise DatasetError(
+        f"robot_type={robot_type!r} in meta/info.json is not a simulation of this package; allowed: {known}"
+    )
+
+
+for _spec in (SCOOP, GRASP):
+    register_task(_spec)

@@ -1,0 +1,43 @@
+"""Scoop-v0 as data."""
+
+from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
+
+TASK_STATE_NAMES = (
+    "bucket_mass_kg",
+    "excavated_mass_kg",
+    "deposited_mass_kg",
+    "distance_to_target_m",
+    "distance_to_box_m",
+    "hard_target_contacts",
+    "bucket_depth_below_dig_plane_m",
+    "spill_before_target_events",
+)
+"""Entries of `task_state`; docs/reference defines them."""
+
+SCOOP = TaskSpec(
+    id="Scoop-v0",
+    robot_type="excavator_sim",
+    description="Dig where the mask points, carry the soil to the box and dump it there.",
+    cameras=CAMERAS,
+    state_names=STATE_NAMES,
+    action_names=ACTION_NAMES,
+    action_low=(-1.0,) * len(ACTION_NAMES),
+    action_high=(1.0,) * len(ACTION_NAMES),
+    task_state_names=TASK_STATE_NAMES,
+    duration_s=20.0,  # kind: paper
+    storage="image",
+    settings=ExcavatorSettings,
+    simulation_version=2,
+    changes={
+        1: "soil in the bucket as one volume, ballistic parcels; dig regions hidden from the main view were possible",
+        2: "soil in the bucket as parcels in contact, hence other loads, forces and flows; every scene redrawn, with "
+        "dig regions in view",
+    },
+    env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
+    operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",
+    measures_entry="lerobot_excav.envs.tasks.scoop.measures:SCOOP_MEASURES",
+    task_state_tolerance=1e-2,  # [kg], [m], or a count (kind: guess; the same build repeats exactly)
+    judges_at_the_end=False,
+)

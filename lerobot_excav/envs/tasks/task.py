@@ -1,0 +1,124 @@
+"""A task as data: everything that the rest of the package has to know of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE, TaskSettings
+
+if TYPE_CHECKING:
+    from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+    from lerobot_excav.envs.tasks.measures import TaskMeasures
+
+
+class Operator(Protocol):
+    """A scripted operator of a task."""
+
+    def reset(self, env: Any) -> None:
+        """Look at a freshly reset environment of the task."""
+
+    def act(self, env: Any) -> NDArray[np.float32]:
+        """Return the next action, (actions,); after the end of the work one that holds still."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskSpec:
+    """One task: names, limits and units as data, and where its code is.
+
+    The code is named as `module:object` and loaded at first use, so that every command can list the tasks quickly.
+
+    Attributes:
+        id: Name in the gym namespace `lerobot_excav`.
+        robot_type: `--robot.type` of its simulated robot, and `robot_type` of its datasets.
+        description: What is to be done, in a sentence; the task of LeRobot's datasets.
+        cameras: Names of the pictures: `main`, which the mask belongs to, others, and `target_mask`.
+        state_names: Elements of `agent_pos` and `observation.state`; each ends in `.pos` or `.vel`.
+        action_names: Elements of an action.
+        action_low: Least value of each.
+        action_high: Greatest value of each.
+        task_state_names: Elements of `info["task_state"]`.
+        duration_s: Time limit unless another is asked for [s].
+        storage: How pictures of demonstrations are stored unless asked otherwise; long action chunks need `video`.
+        settings: What a user may set; its `ENV_TYPE` is the `--env.type`.
+        simulation_version: Version of the simulation. Recorded actions lead to the recorded states again in the version
+            that made them only. It counts changes of soil, machine, scenes or targets after which a replay deviates or
+            a scene's number means another scene; speed, pictures and policies are not part of it.
+        changes: What each version is, or changed.
+        env_entry: Class of the environment, a `MaskedTaskEnv`.
+        operator_entry: Class of the scripted operator, an `Operator` made with `rng`.
+        measures_entry: The `TaskMeasures`.
+        nearest_target_entry: Function from scene set and scene to the target that is nearest at the start; None if the
+            task defines no such thing.
+        task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
+        judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
+        target_count: Targets of a scene.
+    """
+
+    id: str
+    robot_type: str
+    description: str
+    cameras: tuple[str, ...]
+    state_names: tuple[str, ...]
+    action_names: tuple[str, ...]
+    action_low: tuple[float, ...]
+    action_high: tuple[float, ...]
+    task_state_names: tuple[str, ...]
+    duration_s: float
+    storage: Literal["image", "video"]
+    settings: type[TaskSettings]
+    simulation_version: int
+    changes: Mapping[int, str]
+    env_entry: str
+    operator_entry: str
+    measures_entry: str
+    nearest_target_entry: str | None = None
+    task_state_tolerance: float
+    judges_at_the_end: bool
+    target_count: int = TARGETS_PER_SCENE
+
+    @property
+    def env_type(self) -> str:
+        """Name of the environment, as in `--env.type`."""
+        return self.settings.ENV_TYPE
+
+    @property
+    def gym_id(self) -> str:
+        """Id of the task in the registry of Gymnasium."""
+        return f"lerobot_excav/{self.id}"
+
+    @property
+    def measures(self) -> "TaskMeasures":
+        """What is measured of an episode, and how reports show it."""
+        measures: TaskMeasures = resolve_name(self.measures_entry)
+        return measures
+
+    def make_settings(self, **values: Any) -> TaskSettings:
+        """Make settings of this task; those left out have their defaults."""
+        return self.settings.of({"task": self.id, **values})
+
+    def make_env(self, **arguments: Any) -> "MaskedTaskEnv[Any, Any]":
+        """Make the environment; see `MaskedTaskEnv` for the arguments."""
+        env: MaskedTaskEnv[Any, Any] = resolve_name(self.env_entry)(**{"task": self.id, **arguments})
+        return env
+
+    def make_operator(self, rng: np.random.Generator) -> Operator:
+        """Make a scripted operator, whose style is drawn from `rng`."""
+        operator: Operator = resolve_name(self.operator_entry)(rng=rng)
+        return operator
+
+    def nearest_target(self, scene_set: str, scene_id: int) -> int:
+        """Return the target of a scene that is nearest at the start."""
+        assert self.nearest_target_entry is not None  # what offers the choice checks it
+        return int(resolve_name(self.nearest_target_entry)(scene_set, scene_id))
+
+    def length_at(self, fps: int) -> int:
+        """Return the time limit at a frame rate [frames]."""
+        return round(self.duration_s * fps)
+
+    def replay_length(self, frames: int) -> int:
+        """Return the time limit [frames] under which a recording of this length is judged as it was."""
+        return frames if self.judges_at_the_end else frames + 1
