@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 
 FRAMES_PER_SECOND = 20
 """With one tick to a picture, 2.5 times slower than real time."""
@@ -70,10 +70,10 @@ def _pictures(height: int, width: int) -> Iterator[Image]:
     """Play the cycle tick by tick and yield the pictures of the film."""
     env = ExcavatorEnv(obs_type="agent_pos", fps=TICKS_PER_SECOND)
     env.reset(options={"scene_id": _SCENE, "target_id": _TARGET})
-    operator = ScriptedOperator(rng=np.random.default_rng(0))
+    operator = DigOperator(rng=np.random.default_rng(0))
     operator.reset(env)
     soil = env.worksite.soil
-    renderer = WorksiteRenderer(env.worksite.machine, height=height, width=width)
+    renderer = WorksiteRenderer(env.worksite, height=height, width=width)
     wait = 0
     for _ in range(_LONGEST_S * TICKS_PER_SECOND):
         if env.cycle.is_complete:
@@ -84,7 +84,7 @@ def _pictures(height: int, width: int) -> Iterator[Image]:
         )
         wait = min(wait, stride) - 1
         if wait <= 0:
-            yield renderer.render("side", soil)
+            yield renderer.render("side")
             wait = stride
     renderer.close()
 
