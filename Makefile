@@ -43,8 +43,9 @@ demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a vi
 demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leaves a video and a table (< 3 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo_fr5.sh outputs/demo_fr5
 
-table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; goes on where it stopped; JOBS=2)
-	@$(RUN)/lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=$(JOBS)
+table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; JOBS=2; run again to continue)
+	@test -x $(RUN)/snakemake || UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact --extra workflows
+	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/fr5_grasp/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
 	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal

@@ -38,7 +38,10 @@ def test_target_selection_is_told_apart_from_success(make_run, lines):
 def test_following_a_wrong_mask_is_told_apart_from_the_command(make_run, grasp_line):
     wrong = {**NOTHING, "mask_condition": "mismatched"}
     lines = [
-        *(grasp_line(i, **wrong, shown_target_id=(i + 1) % 4, first_grasped_block=(i + 1) % 4) for i in range(3)),
+        *(
+            grasp_line(i, **wrong, shown_target_id=(i + 1) % 4, first_grasped_block=(i + 1) % 4)
+            for i in range(3)
+        ),
         grasp_line(3, **wrong, shown_target_id=0, first_grasped_block=3),
         grasp_line(4, **wrong, shown_target_id=1, first_grasped_block=-1),
     ]
@@ -69,7 +72,7 @@ def test_after_a_change_of_the_command_the_last_one_counts(make_run, grasp_line)
     ]
     (row,) = make_report([make_run("a", lines)]).runs
     assert row["first_grasped"] == {"commanded": 1, "other": 1, "none": 0}
-    assert row.setting == {"mask": "correct, changed at frame 25"}
+    assert row.run.setting == {"mask": "correct, changed at frame 25"}
 
 
 @pytest.mark.parametrize(

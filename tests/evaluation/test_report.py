@@ -25,15 +25,17 @@ def operator(make_run, scoop_line):
 
 def test_rates_count_episodes_and_masses_count_scenes(runs):
     half, full = make_report(runs).runs
-    assert (half["target_success"].estimate, half.episodes, half.seeds, half.scenes) == (0.5, 10, 1, 10)
-    assert (full["target_success"].estimate, full.episodes, full.seeds, full.scenes) == (1.0, 20, 2, 10)
+    assert half["target_success"].estimate == 0.5
+    assert half.counts == {"episodes": 10, "seeds": 1, "scenes": 10}
+    assert full["target_success"].estimate == 1.0
+    assert full.counts == {"episodes": 20, "seeds": 2, "scenes": 10}
     assert full["retained_mass_kg"].estimate == 280.0
     assert half["efficiency"] is None
 
 
 def test_efficiency_relates_to_the_operator_on_the_same_scenes(runs, operator):
     report = make_report(runs, operator=operator)
-    assert [run.label for run in report.runs] == ["half", "full", "operator"]
+    assert [row.run.label for row in report.runs] == ["half", "full", "operator"]
     assert [run["efficiency"].estimate for run in report.runs] == pytest.approx([0.375, 0.7, 1.0])
     assert report.operator == "scripted"
 

@@ -25,15 +25,18 @@ class PageRow:
 
     Attributes:
         row: What the page says of it.
-        run: The episodes.
-        summary: The measures.
+        summary: The episodes and their measures.
         origin: Command, code and training.
     """
 
     row: Row
-    run: Run
     summary: RunSummary
     origin: EvaluationOrigin
+
+    @property
+    def run(self) -> Run:
+        """The episodes."""
+        return self.summary.run
 
     @property
     def metrics(self) -> Path:
@@ -177,7 +180,7 @@ def _is_run(contents: Contents, row: Row) -> bool:
 def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
     path = contents.metrics_path(row.label)
     run = Run(label=row.label, evaluations=(read_evaluation(path),))
-    return PageRow(row=row, run=run, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
+    return PageRow(row=row, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
 
 
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
