@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, STATE_NAMES
-from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim

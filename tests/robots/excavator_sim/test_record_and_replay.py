@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.scripts import lerobot_record, lerobot_replay
+from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 
 from lerobot_excav.datasets.format.schema import dataset_features, excav_features
-from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 from lerobot_excav.envs.machines.excavator.features import STATE_NAMES
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim

@@ -2,8 +2,8 @@ import re
 from pathlib import Path
 
 import pytest
-
 from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+
 from lerobot_excav.errors import ConfigurationError
 from validation.soil.catalogue import EXPERIMENTS, chosen
 from validation.soil.experiment import Conditions, SoilExperiment

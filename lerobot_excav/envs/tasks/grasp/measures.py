@@ -76,7 +76,7 @@ def grasp_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
 
 def grasp_summary(index: "pd.DataFrame") -> str:
     """Describe the outcomes of an index."""
-    took_target = int((index["first_grasped_block"] == index["target_id"]).sum())
+    took_target = int((index["first_grasped_block"] == index["final_target_id"]).sum())
     return f"first block taken: the commanded one in {took_target} of {len(index)}"
 
 

@@ -100,7 +100,8 @@ def _draw_pile_with_targets(
         except TooFewTargetsError:
             continue
     raise ExcavError(
-        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene"
+        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; take a soil that "
+        "rests steeper, or report this scene if it is a preset"
     )
 
 

@@ -123,8 +123,8 @@ def test_terrain_points_see_through_the_machine(machine, renderer, soil):
 def test_terrain_points_lie_on_the_soil(machine, renderer, soil):
     soil.reset(np.maximum(1.0 - 0.6 * np.hypot(*np.meshgrid(soil.x_w, soil.y_w, indexing="ij")), 0.0))
     points_w = seen(renderer, soil).terrain_points_w()
-    seen = points_w[np.isfinite(points_w[..., 0])]
-    error = np.abs(seen[:, 2] - soil.height_at(seen[:, :2]))
+    ground_w = points_w[np.isfinite(points_w[..., 0])]
+    error = np.abs(ground_w[:, 2] - soil.height_at(ground_w[:, :2]))
     assert np.quantile(error, 0.99) < 0.03
     assert error.max() < 0.08
 

@@ -88,8 +88,8 @@ def test_fidelity_changes_the_course_of_the_soil():
 
 def test_a_soil_of_ones_own_shapes_the_pile_and_is_dug():
     heavy = SoilParameters(
-        density_kg_m3=2000.0,
-        friction_angle_rad=0.55,
+        density_kg_m3=1700.0,
+        friction_angle_rad=0.7,
         cohesion_pa=500.0,
         swell=1.0,
         steel_friction_angle_rad=0.4,
@@ -119,7 +119,7 @@ def test_all_targets_of_a_scene_are_seen_and_paired_resets_differ_in_the_mask_on
     starts = [seeing_env.reset(options={"scene_id": 9, "target_id": target_id})[0] for target_id in range(4)]
     masks = [mask_of(start) for start in starts]
     assert min(mask.sum() for mask in masks) >= 50
-    assert not np.sum(masks, axis=0).max() > 1
+    assert len({mask.tobytes() for mask in masks}) == 4
     for start in starts[1:]:
         assert np.array_equal(start["agent_pos"], starts[0]["agent_pos"])
         for camera in ("main", "cab"):
