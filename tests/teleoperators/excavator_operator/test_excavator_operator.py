@@ -21,7 +21,7 @@ def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> 
         driven = []
         for _ in range(25):
             driven.append(list(operator.get_action().values()))
-            robot.send_action(dict(zip(robot.action_names, driven[-1], strict=True)))
+            robot.send_action(dict(zip(robot.task_spec.action_names, driven[-1], strict=True)))
     env = ExcavatorEnv(obs_type="agent_pos")
     env.reset(options={"scene_id": 1, "target_id": 2})
     script = DigOperator(rng=np.random.default_rng((3, 1, 2)))
