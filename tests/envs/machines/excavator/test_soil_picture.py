@@ -3,7 +3,7 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP
-from lerobot_excav.envs.constants import TICK_S
+from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture, _resampled
