@@ -85,14 +85,6 @@ def wall_contact(
     arm = -gap * normal
     rolling_velocity = np.asarray(-radius * np.cross(normal, spin), dtype=np.float64)
     force, roll = contact(
-        springs,
-        normal,
-        radius - gap,
-        velocity + np.cross(spin, arm),
-        rolling_velocity,
-        mass,
-        radius,
-        law,
-        dt,
+        springs, normal, radius - gap, velocity + np.cross(spin, arm), rolling_velocity, mass, radius, law, dt
     )
     return force, np.cross(arm, force) + radius * np.cross(normal, roll)

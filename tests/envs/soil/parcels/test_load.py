@@ -153,20 +153,16 @@ def test_a_load_that_is_busy_stays_awake(make_state, tool_path, why):
         assert not state.asleep.any()
 
 
-def test_cutting_wakes_the_load(make_state, tool_path):
+@pytest.mark.parametrize(
+    ("hit", "cutting", "wakes"), [(0.9, False, False), (1.1, False, True), (0.0, True, True)]
+)
+def test_a_hard_hit_and_cutting_wake_the_load_and_a_soft_hit_does_not(
+    make_state, tool_path, hit, cutting, wakes
+):
     tool = tool_path(pitch=CARRY)
     state, rest = asleep_in(make_state, tool)
-    rest.update(state, tool, TICK_S, 0.0, cutting=True)
-    assert not state.asleep.any()
-
-
-def test_a_hard_hit_wakes_the_load_and_a_soft_one_does_not(make_state, tool_path):
-    tool = tool_path(pitch=CARRY)
-    state, rest = asleep_in(make_state, tool)
-    rest.update(state, tool, TICK_S, 0.9 * WAKING_SPEED_M_S, cutting=False)
-    assert state.asleep.all()
-    rest.update(state, tool, TICK_S, 1.1 * WAKING_SPEED_M_S, cutting=False)
-    assert not state.asleep.any()
+    rest.update(state, tool, TICK_S, hit * WAKING_SPEED_M_S, cutting=cutting)
+    assert state.asleep.all() != wakes
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])

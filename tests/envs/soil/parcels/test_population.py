@@ -43,12 +43,6 @@ def copy(state):
     return State(*(array.copy() for array in state))
 
 
-def test_the_radius_of_a_parcel_is_that_of_its_mass(make_population):
-    population = make_population()
-    add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]], masses=[MASS, MASS / 8.0])
-    np.testing.assert_allclose(population.state.radii, [RADIUS, RADIUS / 2.0])
-
-
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
 def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(
@@ -154,28 +148,29 @@ def ticks_until_landed(population):
     return None
 
 
-@pytest.mark.parametrize("place", [TOUCHES_GROUND, TOUCHES_BOX_FLOOR])
-def test_a_parcel_becomes_ground_when_it_has_been_slow_there_for_a_while(make_population, place):
-    population = make_population()
-    lying(population, ground=place, velocities=[0.9 * SETTLING_SPEED_M_S, 0.0, 0.0])
-    assert ticks_until_landed(population) == math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
-    assert len(population.state.masses) == 0
+WHILE = math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
+SLOW, FAST = [0.9 * SETTLING_SPEED_M_S, 0.0, 0.0], [1.1 * SETTLING_SPEED_M_S, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
-    "arrays",
+    ("arrays", "ticks"),
     [
-        {"ground": TOUCHES_GROUND, "velocities": [1.1 * SETTLING_SPEED_M_S, 0.0, 0.0]},
-        {"ground": TOUCHES_NOTHING},
-        {"ground": TOUCHES_GROUND, "load": 1},
-        {"ground": TOUCHES_GROUND, "load": 1, "asleep": 1},
-        {"ground": TOUCHES_OUTSIDE, "load": 1},
+        ({"ground": TOUCHES_GROUND, "velocities": SLOW}, WHILE),
+        ({"ground": TOUCHES_BOX_FLOOR, "velocities": SLOW}, WHILE),
+        ({"ground": TOUCHES_GROUND, "velocities": FAST}, None),
+        ({"ground": TOUCHES_NOTHING}, None),
+        ({"ground": TOUCHES_GROUND, "load": 1}, None),
+        ({"ground": TOUCHES_GROUND, "load": 1, "asleep": 1}, None),
+        ({"ground": TOUCHES_OUTSIDE, "load": 1}, None),
+        ({"ground": TOUCHES_OUTSIDE, "velocities": FAST}, 1),  # beyond the border
+        ({"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL, "velocities": FAST}, 1),  # under the bucket
     ],
 )
-def test_a_parcel_that_is_fast_or_in_the_air_or_in_the_bucket_stays_a_parcel(make_population, arrays):
+def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_population, arrays, ticks):
     population = make_population()
     lying(population, **arrays)
-    assert ticks_until_landed(population) is None
+    assert ticks_until_landed(population) == ticks
+    assert len(population.state.masses) == (ticks is None)
 
 
 def test_the_rest_must_not_be_interrupted(make_population):
@@ -187,15 +182,6 @@ def test_the_rest_must_not_be_interrupted(make_population):
         state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
         population.settle(NO_GROUND, TICK_S)
         state.velocities[0, 0] = 0.0
-
-
-@pytest.mark.parametrize(
-    "arrays", [{"ground": TOUCHES_OUTSIDE}, {"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL}]
-)
-def test_beyond_the_border_and_between_bucket_and_ground_a_parcel_goes_at_once(make_population, arrays):
-    population = make_population()
-    lying(population, velocities=[5.0, 0.0, 0.0], **arrays)
-    assert ticks_until_landed(population) == 1
 
 
 def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
