@@ -103,8 +103,8 @@ def measure(
     training = take_turns({name: training_step(policy, batch) for name, policy in policies.items()}, rounds)
     plans = take_turns({name: planning(policy) for name, policy in policies.items()}, rounds)
     for name in policies:
-        print(f"{'training ' + name:42} {batch_size / training[name]:10.2f} samples/s")  # noqa: T201
-        print(f"{'planning ' + name:42} {1e3 * plans[name]:10.2f} ms per chunk")  # noqa: T201
+        print(f"{'training ' + name:42} {batch_size / training[name]:10.2f} samples/s")
+        print(f"{'planning ' + name:42} {1e3 * plans[name]:10.2f} ms per chunk")
 
 
 if __name__ == "__main__":

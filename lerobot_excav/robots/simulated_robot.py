@@ -70,7 +70,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
 
     def make_env(self) -> MaskedTaskEnv[Any, Any]:
         """Make the environment that the configuration describes, without an end to its episodes."""
-        return self.task_spec.make_env(**{**self.settings.as_dict(), "episode_length": ENDLESS_FRAMES})
+        endless = {**self.settings.as_dict(), "episode_length": ENDLESS_FRAMES}
+        env: MaskedTaskEnv[Any, Any] = self.task_spec.make_env(**endless)
+        return env
 
     @property
     def observation_features(self) -> dict[str, type | tuple[int, int, int]]:

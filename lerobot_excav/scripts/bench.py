@@ -31,9 +31,7 @@ MEASURES = ("environment", "writing", "demos")
 class BenchArguments(WorkArguments, PlayedScenes):
     """Arguments of `lerobot-excav bench`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=default_environment
-    )
+    env: EnvironmentChoice = dataclasses.field(default_factory=default_environment)
     """Environment, with its settings; the excavator by default."""
 
     scenes: int = with_default(PlayedScenes, "scenes", 3)

@@ -54,9 +54,7 @@ def default_environment(**settings: Any) -> Any:
 class DemosArguments(ResumableArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=default_environment
-    )
+    env: EnvironmentChoice = dataclasses.field(default_factory=default_environment)
     """Environment, with its settings; the excavator by default."""
     out: Path | None = setting("Folder of the dataset; must not exist", default=None)
 

@@ -30,9 +30,7 @@ MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay"
 class OperatorArguments(ResumableArguments, PlayedScenes):
     """Arguments of `lerobot-excav operator`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=lambda: default_environment(scene_set="test")
-    )
+    env: EnvironmentChoice = dataclasses.field(default_factory=lambda: default_environment(scene_set="test"))
     """Environment, with its settings; the excavator's test scenes by default."""
 
     metrics: Path | None = setting("Metrics file to write; must not exist", default=None)

@@ -350,8 +350,9 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         if camera != "main":
             return self.renderer.render(camera)
         picture = self.picture()
-        overlay = self.settings.target_overlay and self._mask is not None
-        return tinted(picture, self._mask.pixels) if overlay else picture
+        if not self.settings.target_overlay or self._mask is None:
+            return picture
+        return tinted(picture, self._mask.pixels)
 
     def _info(self, *, is_over: bool) -> dict[str, Any]:
         info = {
