@@ -93,9 +93,7 @@ def take_turns(tasks: dict[str, Task], rounds: int) -> dict[str, float]:
     return {name: statistics.median(times) for name, times in durations.items()}
 
 
-def measure(
-    *, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100
-) -> None:
+def measure(*, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100) -> None:
     """Print the speeds of all policies, one number a line."""
     configs = policy_configs(height=height, width=width, chunk_size=chunk_size)
     policies = {name: get_policy_class(config.type)(config) for name, config in configs.items()}

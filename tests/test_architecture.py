@@ -45,9 +45,7 @@ def imported_modules(path):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             modules = [f"{node.module}.{alias.name}" for alias in node.names]
-            names = [
-                name if (ROOT / f"{name.replace('.', '/')}.py").exists() else node.module for name in modules
-            ]
+            names = [name if (ROOT / f"{name.replace('.', '/')}.py").exists() else node.module for name in modules]
         yield from (n.removeprefix("lerobot_excav.") for n in names if n.startswith("lerobot_excav."))
 
 

@@ -51,9 +51,7 @@ class RunSummary:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the row as plain data."""
-        values = {
-            key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()
-        }
+        values = {key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()}
         known = {"label": self.run.label, "task": self.run.task}
         return {**known, **self.counts, **self.run.constants, **values}
 

@@ -238,8 +238,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     def _require_mask(self, info: Mapping[str, Any]) -> None:
         if info.get("mask_missing"):
             raise MaskMissingError(
-                f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of scene "
-                f"{self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
+                f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of "
+                f"scene {self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
                 "with another --robot.scene_id or --robot.target_id, choose larger pictures or another source."
             )
 

@@ -6,7 +6,7 @@
 Examples:
   lerobot-excav operator --env.type=excavator --scenes=100 --metrics=outputs/operator.jsonl
       100 test scenes with 4 targets each
-  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
+  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/o.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
   lerobot-excav operator --env.type=fr5_grasp --env.retarget_frame=100 --scenes=100 --metrics=outputs/fr5_operator.jsonl
       the arm's operator, whose command changes after 2 s

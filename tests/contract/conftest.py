@@ -12,9 +12,7 @@ import lerobot_excav.plugin  # noqa: F401 - registers every --robot.type
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
 ROBOT_TYPES = sorted(
-    name
-    for name, config in RobotConfig.get_known_choices().items()
-    if config.__module__.startswith("lerobot_excav.")
+    name for name, config in RobotConfig.get_known_choices().items() if config.__module__.startswith("lerobot_excav.")
 )
 
 

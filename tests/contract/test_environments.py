@@ -269,9 +269,7 @@ def test_an_impossible_target_is_refused(env: gym.Env[Any, Any]) -> None:
 
 
 @pytest.mark.parametrize("use_async", [False, True], ids=["one process", "own processes"])
-def test_lerobots_environments_give_the_same_bits_as_one_alone(
-    gym_id: str, trace: Trace, *, use_async: bool
-) -> None:
+def test_lerobots_environments_give_the_same_bits_as_one_alone(gym_id: str, trace: Trace, *, use_async: bool) -> None:
     # One frame more than is played: at the end of an episode LeRobot's wrapper repeats the last transition.
     config = config_of(gym_id, episode_length=FRAMES + 1)
     ((vector,),) = ([*tasks.values()] for tasks in config.create_envs(2, use_async_envs=use_async).values())
@@ -284,7 +282,6 @@ def test_lerobots_environments_give_the_same_bits_as_one_alone(
         played.append((flat(observation), reward))
     vector.close()
     of_seed_4 = [
-        ({key: array[0] for key, array in observation.items()}, float(reward[0]))
-        for observation, reward in played
+        ({key: array[0] for key, array in observation.items()}, float(reward[0])) for observation, reward in played
     ]
     assert_same(of_seed_4, trace)

@@ -41,8 +41,7 @@ def test_features_are_known_before_connecting(new_robot: MakeRobot) -> None:
 def test_rollout_keeps_every_scalar(new_robot: MakeRobot) -> None:
     robot = new_robot()
     assert all(
-        name.endswith((".pos", ".vel"))
-        for name in (*robot.task_spec.state_names, *robot.task_spec.action_names)
+        name.endswith((".pos", ".vel")) for name in (*robot.task_spec.state_names, *robot.task_spec.action_names)
     )
 
 

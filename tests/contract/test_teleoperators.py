@@ -108,9 +108,7 @@ def test_the_seed_changes_the_demonstration(robot: SimulatedRobot, make_operator
     assert drive(robot, make_operator(seed=1)) != first
 
 
-def test_what_it_records_is_what_the_robot_carries_out(
-    robot: SimulatedRobot, make_operator: MakeOperator
-) -> None:
+def test_what_it_records_is_what_the_robot_carries_out(robot: SimulatedRobot, make_operator: MakeOperator) -> None:
     robot.connect()
     operator = make_operator()
     action = operator.get_action()

@@ -34,9 +34,7 @@ MEASURES = TaskMeasures(
 
 @pytest.fixture
 def sweep_line(monkeypatch, grasp_line):
-    monkeypatch.setitem(
-        TASKS, "Sweep-v0", SimpleNamespace(id="Sweep-v0", env_type="sweep", measures=MEASURES)
-    )
+    monkeypatch.setitem(TASKS, "Sweep-v0", SimpleNamespace(id="Sweep-v0", env_type="sweep", measures=MEASURES))
     return lambda number, **changes: grasp_line(number, task="Sweep-v0", swept_m2=2.0 + number, **changes)
 
 

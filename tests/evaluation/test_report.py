@@ -9,18 +9,14 @@ from lerobot_excav.evaluation.report_text import report_text
 
 @pytest.fixture
 def runs(make_run, scoop_line):
-    half = make_run(
-        "half", [scoop_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)]
-    )
+    half = make_run("half", [scoop_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)])
     full = make_run("full", *[[scoop_line(i, retained_mass_kg=280.0) for i in range(10)]] * 2)
     return [half, full]
 
 
 @pytest.fixture
 def operator(make_run, scoop_line):
-    return make_run(
-        "operator", [scoop_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)]
-    )
+    return make_run("operator", [scoop_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)])
 
 
 def test_rates_count_episodes_and_masses_count_scenes(runs):

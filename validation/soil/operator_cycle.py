@@ -35,12 +35,8 @@ def run(conditions: Conditions) -> Result:
     low, high = RETAINED_KG
     return Result(
         checks=(Check("mean retained mass", float(np.mean(masses)), "kg", low=low, high=high),),
-        tables=(
-            Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),
-        ),
-        remarks=(
-            f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",
-        ),
+        tables=(Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),),
+        remarks=(f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",),
     )
 
 

@@ -194,9 +194,7 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
         section=section,
         rows=present,
         missing=[row.label for row in section.rows if row.label not in rows],
-        differences=[
-            _difference(reference.run, row.run, rng) for row in present if reference and row is not reference
-        ],
+        differences=[_difference(reference.run, row.run, rng) for row in present if reference and row is not reference],
     )
 
 
@@ -214,6 +212,4 @@ def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDiffe
     """Compare on common scenes: a row may have played fewer of them than its reference."""
     common = set(reference.keys) & set(run.keys)
     differences = compare(reference.only(common), run.only(common), rng) if common else []
-    return PageDifference(
-        label=run.label, reference=reference.label, scenes=len(common), differences=differences
-    )
+    return PageDifference(label=run.label, reference=reference.label, scenes=len(common), differences=differences)

@@ -179,6 +179,4 @@ def _heading(row: PageRow) -> str:
 def _by_hand(page: ResultPage) -> list[str]:
     """Name what has no known command."""
     trainings = [f"training {training.name}" for training in page.trainings if not training.command]
-    return trainings + [
-        f"{row.row.label} (seed {_number(row.seed)})" for row in page.rows if not row.origin.command
-    ]
+    return trainings + [f"{row.row.label} (seed {_number(row.seed)})" for row in page.rows if not row.origin.command]

@@ -148,9 +148,7 @@ def test_a_task_gives_the_same_alone_and_beside_others(tmp_path: Path, task: str
     own = {"mask_noise": "shift", "mask_noise_px": 2, "scene_set": "test", "episode_length": 4}
     for n_envs in (1, 3):
         path = tmp_path / f"{n_envs}.jsonl"
-        config = EnvConfig.get_choice_class(spec.env_type)(
-            **own, metrics_path=path, metrics_episodes=EPISODES
-        )
+        config = EnvConfig.get_choice_class(spec.env_type)(**own, metrics_path=path, metrics_episodes=EPISODES)
         counted = evaluate(config.create_envs(n_envs)[spec.env_type][0], start_seed=1000)
         results.append((counted, [json.loads(line) for line in path.read_text().splitlines()]))
     assert results[0] == results[1]
@@ -163,10 +161,7 @@ def test_a_task_gives_the_same_alone_and_beside_others(tmp_path: Path, task: str
         "simulation_version": spec.simulation_version,
     }
     assert lines[0].items() >= {k: v for k, v in expected.items() if v is not None}.items()
-    assert (
-        lines[0].items()
-        >= {"frames": 4, "is_success": False, "commands": [[0, 0]], "shown_target_id": 0}.items()
-    )
+    assert lines[0].items() >= {"frames": 4, "is_success": False, "commands": [[0, 0]], "shown_target_id": 0}.items()
     # What reports read of the task is there, with the right types.
     assert spec.measures.record.model_validate_json(path.read_text().splitlines()[0])
 
@@ -205,9 +200,7 @@ def test_a_finished_environment_costs_nothing_and_repeats_its_end() -> None:
 
 def test_a_plain_reset_begins_a_new_batch(tmp_path: Path) -> None:
     path = tmp_path / "metrics.jsonl"
-    config = ExcavatorEnvConfig(
-        observation_height=32, observation_width=48, episode_length=2, metrics_path=path
-    )
+    config = ExcavatorEnvConfig(observation_height=32, observation_width=48, episode_length=2, metrics_path=path)
     env = config.create_envs(1)["excavator"][0]
     still = np.zeros((1, 4), np.float32)
     scenes = []

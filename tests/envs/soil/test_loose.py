@@ -78,9 +78,7 @@ def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
 
 
 def test_soil_heaped_above_the_wall_runs_out_of_the_box():
-    small = Container(
-        center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0
-    )
+    small = Container(center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0)
     soil = Soil(container=small)
     for _ in range(100):
         soil.add_parcels([[4.0, 0.0, 0.9]], np.zeros((1, 3)))

@@ -96,9 +96,7 @@ def distance_to_plates(points_t):
     """Return (n,) distances of tool points to the nearest of bottom, back and side plates."""
     outline, half = BUCKET.profile_t, 0.5 * BUCKET.inner_width_m
     flat, aside = points_t[:, [0, 2]], np.abs(points_t[:, 1])
-    sides = np.array(
-        [to_segment(flat, a, b) for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)]
-    )
+    sides = np.array([to_segment(flat, a, b) for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)])
     is_inside = (flat @ BUCKET.planes_t[:-2, [0, 2]].T <= BUCKET.planes_t[:-2, 3]).all(axis=1)
     to_shell = np.hypot(sides[:-1].min(axis=0), np.maximum(aside - half, 0.0))  # the last side is the opening
     to_cheeks = np.hypot(aside - half, np.where(is_inside, 0.0, sides.min(axis=0)))
@@ -133,9 +131,7 @@ def assert_sound(soil, total):
 
 def few(examples):
     """Few examples, always the same ones: every one is a dig of several seconds of computing under a new soil."""
-    return settings(
-        max_examples=examples, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate)
-    )
+    return settings(max_examples=examples, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
 
 
 every_soil = pytest.mark.parametrize("preset", PRESETS)
@@ -170,9 +166,7 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
     soil = random_soil(preset, fidelity, rng, 0.0)
     total = sum(soil.ledger_kg().values())
     for tick, tool in enumerate(motion([*random_goals(rng), DUMPED, DUMPED, DUMPED])):
-        soil.step(
-            TICK_S, tool if tick % 40 != 39 else None
-        )  # a bucket that goes and comes takes nothing along
+        soil.step(TICK_S, tool if tick % 40 != 39 else None)  # a bucket that goes and comes takes nothing along
         assert_sound(soil, total)
     before = b""
     for _ in range(3000):
@@ -193,7 +187,5 @@ def test_the_distance_to_the_plates_is_that_of_the_reference(points):
     """Keeps the judge of the first test honest."""
     outline, half = BUCKET.profile_t, 0.5 * BUCKET.inner_width_m
     plates = plate_polygons(outline, half)
-    expected = [
-        min(np.linalg.norm(p - nearest_point(plate, np.array(p))) for plate in plates) for p in points
-    ]
+    expected = [min(np.linalg.norm(p - nearest_point(plate, np.array(p))) for plate in plates) for p in points]
     np.testing.assert_allclose(distance_to_plates(np.array(points)), expected, atol=1e-9)

@@ -34,9 +34,7 @@ def test_without_either_the_generator_decides():
 
 
 def test_numpy_integers_become_pythons_own():
-    scene_id, target_id, schedule = select(
-        scene_id=np.int64(3), target_id=np.int32(1), commands=np.array([[2, 3]])
-    )
+    scene_id, target_id, schedule = select(scene_id=np.int64(3), target_id=np.int32(1), commands=np.array([[2, 3]]))
     assert {type(number) for number in (scene_id, target_id, *schedule[0])} == {int}
 
 

@@ -24,9 +24,7 @@ def test_settings_reach_the_environment(tmp_path):
     assert env.episode_length > 10**9
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "allowed"), [("soil", "lava", "sand"), ("fidelity", "exact", "fine")]
-)
+@pytest.mark.parametrize(("field", "value", "allowed"), [("soil", "lava", "sand"), ("fidelity", "exact", "fine")])
 def test_an_impossible_value_is_named_with_what_is_allowed(field, value, allowed):
     with pytest.raises(ConfigurationError, match=f"robot.{field}={value!r}.*{allowed}"):
         ExcavatorSimConfig(**{field: value})

@@ -106,9 +106,7 @@ def test_a_recording_has_the_schema_of_scripted_data(record: Run, tmp_path: Path
     assert dataset.fps == 10
 
 
-def test_an_episode_recorded_again_starts_over(
-    record: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_episode_recorded_again_starts_over(record: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keys = {
         "exit_early": False,
         "rerecord_episode": True,

@@ -18,12 +18,8 @@ ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper targe
 _SUBSTEPS = round(const.CONTROL_TICK_S / const.SUBSTEP_S)
 _SETTLE_TICKS = 10  # 0.2 s, for blocks to find their contact with the table
 
-_CTRL_SCALE = np.append(
-    np.ones(6), const.FINGER_STROKE_M
-)  # from an action to what the servos are given [rad, m]
-_REFERENCE_STEP = const.SUBSTEP_S * np.append(
-    const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M
-)
+_CTRL_SCALE = np.append(np.ones(6), const.FINGER_STROKE_M)  # from an action to what the servos are given [rad, m]
+_REFERENCE_STEP = const.SUBSTEP_S * np.append(const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M)
 """How far the servos' reference may move in a substep: the speed limits [rad, 1]."""
 _REFERENCE_LEAD_RAD = np.array(const.JOINT_DAMPING) / const.JOINT_STIFFNESS * const.JOINT_SPEED_RAD_S
 """How far it may be ahead of a joint: there the servo's stiffness and damping balance at the speed limit [rad]. Without
@@ -93,9 +89,7 @@ class Workcell:
             self._lead_to(target)
             mujoco.mj_step(self.model, self.data)
         if self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
-            raise ExcavError(
-                f"the simulation diverged at {self.data.time:.3f} s; report this scene and action"
-            )
+            raise ExcavError(f"the simulation diverged at {self.data.time:.3f} s; report this scene and action")
 
     @property
     def joint_pos(self) -> NDArray[np.float64]:

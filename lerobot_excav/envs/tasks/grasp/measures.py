@@ -100,9 +100,7 @@ GRASP_MEASURES = TaskMeasures(
         Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
         Column(key="episode_return", header="return", kind=Kind.MEAN, field="episode_return"),
         Column(key="grasped", header="grasped any [%]", kind=Kind.RATE, field="has_grasped"),
-        Column(
-            key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"
-        ),
+        Column(key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"),
         Column(key="mask_followed", header="mask followed [%]", kind=Kind.RATE, field="mask_followed"),
         Column(key="placed", header="placed [%]", kind=Kind.RATE, field="placed"),
         Column(key="first_grasped", header="first grasped", kind=Kind.COUNTS, field="grasped", words=GRASPED),

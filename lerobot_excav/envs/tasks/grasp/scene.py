@@ -71,9 +71,7 @@ def draw_scene(scene_set: str, scene_id: int) -> GraspScene:
     }
     for array in arrays.values():
         array.flags.writeable = False
-    return GraspScene(
-        scene_set=scene_set, scene_id=scene_id, light=float(look_rng.uniform(0.5, 0.8)), **arrays
-    )
+    return GraspScene(scene_set=scene_set, scene_id=scene_id, light=float(look_rng.uniform(0.5, 0.8)), **arrays)
 
 
 def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -86,6 +84,4 @@ def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
         if distance[np.triu_indices(layout.BLOCK_COUNT, 1)].min() >= layout.BLOCK_SPACING_M:
             height = np.full((layout.BLOCK_COUNT, 1), layout.block_rest_height_m())
             return np.concatenate([xy_w, height], axis=1)
-    raise ExcavError(
-        f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene"
-    )
+    raise ExcavError(f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene")

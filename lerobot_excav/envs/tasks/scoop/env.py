@@ -48,8 +48,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     Termination: the cycle is complete (bucket emptied into the box). Truncation: the time limit `episode_length`.
 
-    Arguments: those of `MaskedTaskEnv` and, as settings, the fields of `ExcavatorSettings`. `soil` takes a preset's name
-    or `SoilParameters` of one's own.
+    Arguments: those of `MaskedTaskEnv` and, as settings, the fields of `ExcavatorSettings`. `soil` takes the name of a
+    preset or `SoilParameters` of one's own.
     """
 
     TASK = "Scoop-v0"

@@ -12,9 +12,7 @@ def project(pose, points_w):
     """Image coordinates (column, row) of world points at the default image size."""
     local = (np.atleast_2d(points_w) - pose.position) @ pose.axes
     focal = 0.5 * HEIGHT / np.tan(0.5 * np.radians(pose.fovy_deg))
-    return np.stack(
-        [WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1
-    )
+    return np.stack([WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1)
 
 
 def in_picture(pose, points_w):
@@ -45,18 +43,14 @@ def test_main_sees_into_the_target_box():
 
 
 def test_main_sees_the_cab_and_the_tracks():
-    assert in_picture(
-        MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))]
-    )
+    assert in_picture(MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))])
 
 
 def test_overview_sees_the_whole_dig_area_the_box_and_the_raised_boom():
     assert in_picture(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)))
     for height in (0.0, TARGET_BOX.wall_height_m):
         assert in_picture(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, height))
-    assert in_picture(
-        OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))]
-    )
+    assert in_picture(OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))])
 
 
 def test_cab_sees_the_middle_of_the_box_over_its_wall():

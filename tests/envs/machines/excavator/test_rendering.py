@@ -163,9 +163,7 @@ def test_flying_parcels_are_drawn(machine, renderer, soil):
     machine.reset(AWAY)
     soil.reset(None)
     before = seen(renderer, soil).render("main")
-    soil.add_parcels(
-        np.random.default_rng(0).uniform([-1, -1, 1.0], [1, 1, 1.5], (200, 3)), np.zeros((200, 3))
-    )
+    soil.add_parcels(np.random.default_rng(0).uniform([-1, -1, 1.0], [1, 1, 1.5], (200, 3)), np.zeros((200, 3)))
     assert np.any(seen(renderer, soil).render("main") != before, axis=-1).sum() > 50
     soil.reset(None)
 
@@ -181,9 +179,7 @@ def test_the_load_is_seen_from_every_camera(machine, renderer, soil_with_parcels
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_soil_that_pours_into_the_box_is_seen_from_every_camera(
-    machine, renderer, soil_with_parcels, rng, camera
-):
+def test_soil_that_pours_into_the_box_is_seen_from_every_camera(machine, renderer, soil_with_parcels, rng, camera):
     machine.reset(DUMPING)
     positions = TARGET_BOX.center_w + rng.uniform([-0.3, -0.3, 1.0], [0.3, 0.3, 2.0], (300, 3))
     empty = seen(renderer, soil_with_parcels()).render(camera)

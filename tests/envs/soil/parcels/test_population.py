@@ -28,9 +28,7 @@ RADIUS = 0.045
 MASS = 0.94
 STEPS = 20
 
-NO_GROUND = Site(
-    np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0
-)
+NO_GROUND = Site(np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0)
 
 
 def add(population, positions, velocities=None, masses=None):
@@ -45,9 +43,7 @@ def copy(state):
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
-def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(
-    laws, make_population, seed
-):
+def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(laws, make_population, seed):
     rng = np.random.default_rng(seed)
     positions, velocities = rng.uniform(-1.0, 1.0, (30, 3)), rng.normal(0.0, 1.0, (30, 3))
     masses = rng.uniform(0.1, 2.0, 30)
@@ -100,11 +96,7 @@ def test_growing_beyond_the_first_room_changes_nothing(monkeypatch, make_populat
 def without(memory, gone):
     """Return the memory of pairs with the rows that stay after some have left."""
     rows = np.cumsum(~gone) - 1
-    return {
-        (int(rows[i]), int(rows[j])): springs
-        for (i, j), springs in memory.items()
-        if not gone[i] and not gone[j]
-    }
+    return {(int(rows[i]), int(rows[j])): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
 
 
 def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_population, no_tool, site, laws):
@@ -203,9 +195,7 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
     np.testing.assert_allclose(population.state.masses, MASS * np.array([2.0, 5.0]))
 
 
-def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(
-    make_population, tool_path, site
-):
+def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(make_population, tool_path, site):
     """The back of a carried bucket is let down on a parcel that lies on the ground."""
     population = make_population()
     depth = float(BUCKET.profile_t[:, 1].max())

@@ -93,9 +93,7 @@ def test_every_soil_preset_makes_scenes(soil):
 
 
 def test_soil_preset_changes_the_pile():
-    assert not np.array_equal(
-        draw_scene("train", 0).heights_m, draw_scene("train", 0, soil="wet_sand").heights_m
-    )
+    assert not np.array_equal(draw_scene("train", 0).heights_m, draw_scene("train", 0, soil="wet_sand").heights_m)
 
 
 @pytest.mark.parametrize(
