@@ -79,9 +79,7 @@ def _pictures(height: int, width: int) -> Iterator[Image]:
         if env.cycle.is_complete:
             break
         env.step(operator.act(env))
-        stride = ticks_per_picture(
-            operator.phase, payload_kg=soil.payload_mass_kg, airborne_kg=soil.airborne_mass_kg
-        )
+        stride = ticks_per_picture(operator.phase, payload_kg=soil.payload_mass_kg, airborne_kg=soil.airborne_mass_kg)
         wait = min(wait, stride) - 1
         if wait <= 0:
             yield renderer.render("side")

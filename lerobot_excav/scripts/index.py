@@ -21,7 +21,7 @@ from typing import cast
 
 import pandas as pd
 
-from lerobot_excav.datasets.check.version_check import episodes_by_version, require_one_version, versions_of
+from lerobot_excav.datasets.format.version_check import episodes_by_version, require_one_version, versions_of
 from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, Composition, select, usable
 from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, SplitUnit, split
@@ -37,22 +37,14 @@ DEFAULT_EVAL_FRACTION = 0.2
 class IndexArguments(DatasetArguments):
     """Arguments of `lerobot-excav index`."""
 
-    session: Path | None = setting(
-        "Session log of the simulated robot: add the excav.* columns first", default=None
-    )
-    out: Path | None = setting(
-        "With a session: put the completed dataset here, and keep the recording", default=None
-    )
-    skip_restarted: bool = setting(
-        "With a session: leave out episodes in which the scene was restarted", default=False
-    )
+    session: Path | None = setting("Session log of the simulated robot: add the excav.* columns first", default=None)
+    out: Path | None = setting("With a session: put the completed dataset here, and keep the recording", default=None)
+    skip_restarted: bool = setting("With a session: leave out episodes in which the scene was restarted", default=False)
     select: str = setting("Composition of the episodes to train on", default="all", choices=COMPOSITIONS)
     episodes: int | None = setting("How many episodes; left out: as many as there are", default=None, low=1)
     scenes: int | None = setting("How many scenes, for paired and non-paired", default=None, low=1)
     include_failures: bool = setting("Whether to choose episodes without success as well", default=False)
-    split: str | None = setting(
-        "Hold out whole scenes, or single episodes", default=None, choices=SPLIT_UNITS
-    )
+    split: str | None = setting("Hold out whole scenes, or single episodes", default=None, choices=SPLIT_UNITS)
     eval_fraction: float | None = setting(
         f"Part to hold out; left out: {DEFAULT_EVAL_FRACTION}", default=None, low=0.0, high=1.0
     )
@@ -69,9 +61,7 @@ def run(arguments: IndexArguments) -> int:
     if arguments.session is not None:
         from lerobot_excav.datasets.complete.resimulation import complete_recording
 
-        root = complete_recording(
-            root, arguments.session, out=arguments.out, skip_restarted=arguments.skip_restarted
-        )
+        root = complete_recording(root, arguments.session, out=arguments.out, skip_restarted=arguments.skip_restarted)
     index = write_index(root)
     if not arguments.flags:
         print(f"{root / INDEX_PATH}: {len(index)} episodes")
@@ -147,11 +137,7 @@ def _print_flags(arguments: IndexArguments, root: Path, index: pd.DataFrame) -> 
         print(" ".join(parts.flags()))
         return
     print(f"\nchosen: {len(parts.train)} episodes to train on, {len(parts.evaluation)} held out")
-    print(
-        " \\\n  ".join(
-            ["lerobot-train ...", f"--dataset.root={root}", *(f"'{flag}'" for flag in parts.flags())]
-        )
-    )
+    print(" \\\n  ".join(["lerobot-train ...", f"--dataset.root={root}", *(f"'{flag}'" for flag in parts.flags())]))
 
 
 ARGUMENTS = IndexArguments

@@ -62,9 +62,7 @@ def run(arguments: OperatorArguments) -> int:
     from lerobot_excav.evaluation.run import Run
 
     path = cast(Path, arguments.metrics)
-    evaluate_operator(
-        played(PlayedScenes, arguments), path, workers=arguments.workers, resume=arguments.resume
-    )
+    evaluate_operator(played(PlayedScenes, arguments), path, workers=arguments.workers, resume=arguments.resume)
     operator = Run(label="operator", evaluations=(read_evaluation(path),))
     print(report_text(make_report([operator])))
     print(f"written: {path}")

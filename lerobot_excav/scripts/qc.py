@@ -57,9 +57,7 @@ def run(arguments: QcArguments) -> int:
     from lerobot_excav.datasets.check.quality_check import check_dataset
     from lerobot_excav.datasets.pairs.paired_index import FAILED
 
-    rows = check_dataset(
-        arguments.root, episodes=arguments.episodes, replays=arguments.replays, seed=arguments.seed
-    )
+    rows = check_dataset(arguments.root, episodes=arguments.episodes, replays=arguments.replays, seed=arguments.seed)
     failed = rows[rows["qc"] == FAILED]
     if failed.empty:
         replayed = int(rows["replayed"].sum())

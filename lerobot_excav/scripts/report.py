@@ -41,9 +41,7 @@ class ReportArguments(Arguments):
     metrics: list[str] = field(default_factory=list)
     """[LABEL=]FILE or folder, any number"""
     rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
-    metrics_folder: Path | None = setting(
-        "With --rows: folder of the metrics in place of the file's", default=None
-    )
+    metrics_folder: Path | None = setting("With --rows: folder of the metrics in place of the file's", default=None)
     operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
     out: Path | None = setting("Folder for report.md and report.json", default=None)
     seed: int = setting("Seed of the bootstrap", default=0, low=0)
@@ -85,9 +83,7 @@ def _page(arguments: ReportArguments) -> int:
     from lerobot_excav.evaluation.result_page.page_files import write_page
     from lerobot_excav.evaluation.result_page.page_text import page_text
 
-    require(
-        arguments.operator is None, "--operator is of use with metrics files only; give it a row of the page"
-    )
+    require(arguments.operator is None, "--operator is of use with metrics files only; give it a row of the page")
     assert arguments.rows is not None
     page = make_page(read_contents(arguments.rows, metrics=arguments.metrics_folder), seed=arguments.seed)
     if arguments.out is None:
@@ -124,8 +120,7 @@ def runs_from(results: list[str]) -> list[Run]:
     named = [path.resolve() for paths in files.values() for path in paths]
     require(len(set(named)) == len(named), "the metrics name a file twice; a file is one evaluation")
     return [
-        Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths))
-        for label, paths in files.items()
+        Run(label=label, evaluations=tuple(read_evaluation(path) for path in paths)) for label, paths in files.items()
     ]
 
 

@@ -22,6 +22,8 @@ def _shared(number):
         "mask_noise": "none",
         "mask_noise_px": 0,
         "target_overlay": False,
+        "shown_target_id": number % 4,
+        "mask_missing": False,
         "mask_missing_frames": 0,
         "frames": 200,
         "is_success": True,

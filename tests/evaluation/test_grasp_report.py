@@ -69,7 +69,7 @@ def test_after_a_change_of_the_command_the_last_one_counts(make_run, grasp_line)
     ]
     (row,) = make_report([make_run("a", lines)]).runs
     assert row["first_grasped"] == {"commanded": 1, "other": 1, "none": 0}
-    assert row.setting == {"mask": "correct, changed at frame 25"}
+    assert row.run.setting == {"mask": "correct, changed at frame 25"}
 
 
 @pytest.mark.parametrize(
@@ -86,9 +86,7 @@ def test_the_words_of_a_mask_say_all_that_was_done_to_it(make_run, grasp_line, c
 
 
 def test_a_run_does_not_mix_times_at_which_the_command_changes(make_run, grasp_line):
-    with pytest.raises(
-        ConfigurationError, match=r"a mixes times at which the command changes: \(\) and \(9,\)"
-    ):
+    with pytest.raises(ConfigurationError, match=r"a mixes times at which the command changes: \(\) and \(9,\)"):
         make_run("a", [grasp_line(0), grasp_line(1, commands=[[0, 1], [9, 2]])])
 
 

@@ -16,9 +16,7 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments, parse_arguments
 from lerobot_excav.scripts.main import COMMANDS
 
-COMMAND_ARGUMENTS = {
-    name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS
-}
+COMMAND_ARGUMENTS = {name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS}
 
 
 @dataclass(kw_only=True)
@@ -129,23 +127,15 @@ def test_an_environment_is_chosen_with_its_own_settings():
         parse("--env.type=lathe", kind=COMMAND_ARGUMENTS["demos"])
 
 
-BAD_TEXTS = (
-    r"0 -1 nan inf 1e400 null true typo [ [1,a] {} *x 2026-01-01 2026-13-45 @ !!python/object:x a:b \ ' --"
-)
-bad_texts = st.sampled_from([*BAD_TEXTS.split(), "", "a: b", "\x00", "9" * 30, "9" * 5000]) | st.text(
-    max_size=6
-)
+BAD_TEXTS = r"0 -1 nan inf 1e400 null true typo [ [1,a] {} *x 2026-01-01 2026-13-45 @ !!python/object:x a:b \ ' --"
+bad_texts = st.sampled_from([*BAD_TEXTS.split(), "", "a: b", "\x00", "9" * 30, "9" * 5000]) | st.text(max_size=6)
 
 OPTIONS = [
     (command, "", field.name)
     for command, kind in COMMAND_ARGUMENTS.items()
     for field in fields(kind)
     if field.name not in ("env", kind.POSITIONAL)
-] + [
-    ("demos", env_type, name)
-    for env_type, spec in env_types().items()
-    for name in declared_settings(spec.settings)
-]
+] + [("demos", env_type, name) for env_type, spec in env_types().items() for name in declared_settings(spec.settings)]
 
 
 @settings(max_examples=200)

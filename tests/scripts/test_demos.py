@@ -128,9 +128,7 @@ def test_options_of_the_mask_reach_the_recorded_pictures(tmp_path, options, sett
     item = load(tmp_path / "d")[0]
     assert item["excav.mask_source"] == words
     shown, plain = (
-        env_types()["toy_reach"]
-        .make_env(**SIZE, **changes)
-        .reset(options={"scene_id": 0, "target_id": 0})[0]["pixels"]
+        env_types()["toy_reach"].make_env(**SIZE, **changes).reset(options={"scene_id": 0, "target_id": 0})[0]["pixels"]
         for changes in (settings, {})
     )
     for camera, expected in shown.items():

@@ -24,10 +24,7 @@ def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp
         assert run(ExportArguments(checkpoint=Path("run"), out=tmp_path / out, **settings)) == 0
     full = CardFacts(title="Grasping", env_type="fr5_grasp", results="98 of 100", license="mit")
     assert asked == [(Path("run"), CardFacts()), (Path("run"), full)]
-    assert (
-        f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n"
-        in capsys.readouterr().out
-    )
+    assert f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("checkpoint", [None, Path("no/such/folder")])

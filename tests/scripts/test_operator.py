@@ -19,9 +19,7 @@ SHORT = ("--scenes=1", "--targets=1", "--env.episode_length=4", "--workers=0")
         ("toy_reach", ["--env.scene_set=val"], {"task": "Reach-v0", "scene_set": "val"}, "distance [m]"),
     ],
 )
-def test_the_operator_plays_scenes_and_a_report_is_printed(
-    tmp_path, capsys, env_type, options, expected, column
-):
+def test_the_operator_plays_scenes_and_a_report_is_printed(tmp_path, capsys, env_type, options, expected, column):
     metrics = tmp_path / "operator.jsonl"
     assert main(["operator", f"--env.type={env_type}", *SHORT, *options, f"--metrics={metrics}"]) == 0
     (line,) = map(json.loads, metrics.read_text().splitlines())

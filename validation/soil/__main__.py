@@ -43,14 +43,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", metavar="T1,T3", help="codes of experiments (default: all)")
     parser.add_argument("--soil", choices=PRESETS, default="sand", help="soil preset (default: sand)")
     parser.add_argument("--fidelity", choices=FIDELITIES, default="standard", help="default: standard")
-    parser.add_argument(
-        "--seeds", type=_seeds, default=(0, 1, 2), help="of random arrangements (default: 0,1,2)"
-    )
+    parser.add_argument("--seeds", type=_seeds, default=(0, 1, 2), help="of random arrangements (default: 0,1,2)")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the same gates")
     parser.add_argument("--report", action="store_true", help="write the report with its plots")
-    parser.add_argument(
-        "--out", type=Path, help=f"where to write it (default: {REPORT}, for the whole of it)"
-    )
+    parser.add_argument("--out", type=Path, help=f"where to write it (default: {REPORT}, for the whole of it)")
     parser.add_argument("--json", type=Path, help="also write the values to this file")
     return parser
 
@@ -61,9 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     try:
         _check_files(given)
-        conditions = Conditions(
-            preset=given.soil, fidelity=given.fidelity, seeds=given.seeds, quick=given.quick
-        )
+        conditions = Conditions(preset=given.soil, fidelity=given.fidelity, seeds=given.seeds, quick=given.quick)
         experiments = chosen(given.only)
     except ConfigurationError as error:
         parser.error(str(error))

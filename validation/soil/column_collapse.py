@@ -91,9 +91,7 @@ def _table(found: Found) -> Table:
 
 
 def _fit_table(found: Found, low: int) -> Table:
-    ours = tuple(
-        (f"this soil, {phi:.0f}°", *_fit(groups[:low]), *_fit(groups[low:])) for phi, groups in found.items()
-    )
+    ours = tuple((f"this soil, {phi:.0f}°", *_fit(groups[:low]), *_fit(groups[low:])) for phi, groups in found.items())
     published = (("Lube et al. 2004", *laws.LUBE_FIT), ("Lajeunesse et al. 2004", *laws.LAJEUNESSE_FIT))
     header = ("", "prefactor, low", "exponent, low", "prefactor, tall", "exponent, tall")
     return Table(header, (*ours, *published))
@@ -107,9 +105,7 @@ def _plots(found: Found) -> tuple[Plot, Plot]:
         runs = [one for group in groups for one in group]
         run_out.append(_points(f"this soil, {phi:.0f}°", runs, "run_out", k))
         cone = [laws.cone_run_out(a, phi) for a in aspects]
-        run_out.append(
-            Series(f"height field alone: cone, {phi:.0f}°", aspects, cone, style="dashed", color=k)
-        )
+        run_out.append(Series(f"height field alone: cone, {phi:.0f}°", aspects, cone, style="dashed", color=k))
         height.append(_points(f"this soil, {phi:.0f}°", runs, "height", k))
     return (
         _plot("column_run_out", "Collapse of a column: run-out", "(r − r₀) / r₀", run_out),

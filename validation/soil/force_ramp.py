@@ -50,8 +50,7 @@ def run(conditions: Conditions) -> Result:
     depths = np.asarray(np.linspace(-HIGHEST_M, DEEPEST_M, count), dtype=np.float64)
     soil = Soil(conditions.preset, (4.0, 4.0), 0.05, conditions.fidelity)
     forces = {
-        rake: np.array([force_at_n(soil, float(d), rake) for d in depths])
-        for rake in track(RAKES_DEG, "T16 rakes")
+        rake: np.array([force_at_n(soil, float(d), rake) for d in depths]) for rake in track(RAKES_DEG, "T16 rakes")
     }
     above = max(float(f[depths <= 0.0].max()) for f in forces.values())
     steepest = max(float(np.abs(np.diff(f)).max()) / spacing / float(f[-1]) for f in forces.values())

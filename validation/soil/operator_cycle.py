@@ -3,7 +3,6 @@
 import numpy as np
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.rig import ExcavatorRig
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
@@ -16,17 +15,18 @@ SCENES, QUICK_SCENES = 8, 2
 
 def run(conditions: Conditions) -> Result:
     """Let the scripted operator play validation scenes without pictures."""
-    settings = DemonstrationSettings(
-        scene_set="val",
-        scenes=QUICK_SCENES if conditions.quick else SCENES,
-        targets=1,
-        soil=conditions.preset,
-        fidelity=conditions.fidelity,
-        episode_length=200,
+    env = {
+        "scene_set": "val",
+        "soil": conditions.preset,
+        "fidelity": conditions.fidelity,
+        "episode_length": 200,
+    }
+    settings = DemonstrationSettings.of(
+        "excavator", env, scenes=QUICK_SCENES if conditions.quick else SCENES, targets=1
     )
     rows: list[tuple[float | str, ...]] = []
     for pair in track(settings.pairs(), "T8 cycles"):
-        episode = play_demonstration(ExcavatorRig(with_images=False), settings, pair)
+        episode = play_demonstration(settings, pair, with_images=False)
         retained = float(episode.metrics["retained_mass_kg"])
         residual = float(episode.metrics["residual_bucket_mass_kg"])
         outcome = "yes" if episode.success else "no"
@@ -35,12 +35,8 @@ def run(conditions: Conditions) -> Result:
     low, high = RETAINED_KG
     return Result(
         checks=(Check("mean retained mass", float(np.mean(masses)), "kg", low=low, high=high),),
-        tables=(
-            Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),
-        ),
-        remarks=(
-            f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",
-        ),
+        tables=(Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),),
+        remarks=(f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",),
     )
 
 

@@ -51,8 +51,6 @@ def draw(plot: Plot, path: Path) -> None:
 
 def _draw_curve(axes: "Axes", curve: Series, color: str) -> None:
     if curve.y_high is not None:
-        axes.fill_between(
-            curve.x, curve.y, curve.y_high, color=color, alpha=0.18, linewidth=0, label=curve.label
-        )
+        axes.fill_between(curve.x, curve.y, curve.y_high, color=color, alpha=0.18, linewidth=0, label=curve.label)
         return
     axes.plot(curve.x, curve.y, color=color, label=curve.label, **_STYLES[curve.style])

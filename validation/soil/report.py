@@ -6,6 +6,7 @@ import platform
 from pathlib import Path
 
 from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+
 from validation.soil.experiment import Conditions, SoilExperiment
 from validation.soil.plots import draw
 from validation.soil.results import Check, Result, Table, number_text
@@ -59,11 +60,7 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
         "# Soil against published experiments\n\n"
         f"Written by `{command}`; do not edit it. {total - missed} of {total} gated values are inside "
         "their gates"
-        + (
-            ", all of them.\n\n"
-            if missed == 0
-            else f", {missed} are not; each says by how much, and why.\n\n"
-        )
+        + (", all of them.\n\n" if missed == 0 else f", {missed} are not; each says by how much, and why.\n\n")
         + f"Conditions: soil `{conditions.preset}` where an experiment does not name its own, fidelity "
         f"`{conditions.fidelity}`, seeds {seeds}"
         + (", quick (fewer repetitions)" if conditions.quick else "")

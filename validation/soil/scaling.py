@@ -79,9 +79,7 @@ def grid_scaling(preset: str, fidelity: str, seed: int, *, quick: bool = False) 
     return _quickest(dig, _CELLS[::3] if quick else _CELLS, 1 if quick else _REPEATS)
 
 
-def _quickest(
-    run: Callable[[int], tuple[Array, float]], sizes: Sequence[int], repeats: int
-) -> list[StepTime]:
+def _quickest(run: Callable[[int], tuple[Array, float]], sizes: Sequence[int], repeats: int) -> list[StepTime]:
     """Run every size some times and take the quickest run of every step."""
     run(sizes[0])  # compiles or loads the kernels
     found = []

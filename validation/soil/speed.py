@@ -56,9 +56,7 @@ def _percentile(values: Array, percent: float) -> float:
     return float(np.percentile(values, percent))
 
 
-def _quickest(
-    timed: Callable[[Conditions], tuple[Array, Array]], conditions: Conditions
-) -> tuple[Array, Array]:
+def _quickest(timed: Callable[[Conditions], tuple[Array, Array]], conditions: Conditions) -> tuple[Array, Array]:
     """Return the least time [ms] of every step over some runs, and how many parcels were awake after it."""
     timed(conditions)  # compiles or loads the kernels
     times, awake = zip(*(timed(conditions) for _ in range(RUNS)), strict=True)
@@ -84,8 +82,7 @@ def _crowd(conditions: Conditions) -> tuple[Array, Array]:
 
 def _table(times: dict[str, Array]) -> Table:
     rows = [
-        (name, float(t.mean()), _percentile(t, 50), _percentile(t, 95), float(t.max()))
-        for name, t in times.items()
+        (name, float(t.mean()), _percentile(t, 50), _percentile(t, 95), float(t.max())) for name, t in times.items()
     ]
     return Table(("steps", "mean [ms]", "50 % [ms]", "95 % [ms]", "worst [ms]"), tuple(rows))
 

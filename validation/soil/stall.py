@@ -114,17 +114,13 @@ def run(conditions: Conditions) -> Result:
     """Dig in the soil and in hard ground."""
     parameters = PRESETS[conditions.preset]
     soils = {conditions.preset: parameters, "hard ground": hard_ground(parameters)}
-    digs = {
-        name: dig(soil, fidelity=conditions.fidelity) for name, soil in track(list(soils.items()), "T15 digs")
-    }
+    digs = {name: dig(soil, fidelity=conditions.fidelity) for name, soil in track(list(soils.items()), "T15 digs")}
     checks, rows = [], []
     for name, one in digs.items():
         checks += _checks(name, one)
         dragged, free = one.during("drag", "drag on"), one.edge_speed_m_s.max()
         slowest = float(one.edge_speed_m_s[one.during("drag on")].mean())
-        rows.append(
-            (name, float(one.force_n.max()) / 1e3, slowest, float(free), float(one.power_w[dragged].min()))
-        )
+        rows.append((name, float(one.force_n.max()) / 1e3, slowest, float(free), float(one.power_w[dragged].min())))
     header = (
         *("soil", "greatest force [kN]", "mean speed dragging on [m/s]", "greatest speed [m/s]"),
         "greatest power taken [W]",

@@ -88,13 +88,9 @@ def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:
     for episode in episodes:
         target = episode.pair.target_id
         if not np.array_equal(episode.state[0], episodes[0].state[0]):
-            problems[episode.index] = (
-                f"starts in another state than episode {episodes[0].index} of the same scene"
-            )
+            problems[episode.index] = f"starts in another state than episode {episodes[0].index} of the same scene"
         elif OVERLAY not in episode.mask_changes and _views_differ(episode, untinted[0]):
-            problems[episode.index] = (
-                f"starts with another view than episode {untinted[0].index} of the same scene"
-            )
+            problems[episode.index] = f"starts with another view than episode {untinted[0].index} of the same scene"
         elif not _corruptions(episode):
             shown = masks.setdefault(episode.image(MASK_KEY, 0).tobytes(), target)
             if shown != target:

@@ -10,9 +10,9 @@ import pandas as pd
 
 from lerobot_excav.datasets.check.episode_check import MAIN_KEY, episode_problems, scene_problems
 from lerobot_excav.datasets.check.replay_check import replay_problem
-from lerobot_excav.datasets.check.version_check import require_this_simulation, versions_of
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import require_columns
+from lerobot_excav.datasets.format.version_check import require_this_simulation, versions_of
 from lerobot_excav.datasets.pairs.paired_index import FAILED, PASSED, build_index, index_keys, store_index
 from lerobot_excav.errors import require
 
@@ -91,6 +91,4 @@ def _static_problems(root: Path, wanted: list[int], keys: list[str]) -> dict[int
 
 def _start(episode: EpisodeTable) -> list[str]:
     """Return the settings, besides the scene, that determine how an episode starts; fidelity does not."""
-    return [
-        value for name, value in episode.settings.items() if name in episode.spec.settings.start_columns()
-    ]
+    return [value for name, value in episode.settings.items() if name in episode.spec.settings.start_columns()]

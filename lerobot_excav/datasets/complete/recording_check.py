@@ -6,10 +6,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from lerobot_excav.datasets.check.version_check import require_this_simulation
 from lerobot_excav.datasets.complete.session import SessionEpisode
 from lerobot_excav.datasets.format.episode_table import iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import MASK_KEY, excav_features, require_columns
+from lerobot_excav.datasets.format.version_check import require_this_simulation
 from lerobot_excav.datasets.record.simulation import make_environment
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.settings import TaskSettings
@@ -37,9 +37,7 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
     require_columns(spec, info.features | added)
     missing = [index for index in range(info.total_episodes) if index not in session]
     if missing:
-        raise DatasetError(
-            f"the session has no line for episodes {missing}; is it the session of this recording?"
-        )
+        raise DatasetError(f"the session has no line for episodes {missing}; is it the session of this recording?")
     versions = {index: session[index].simulation_version for index in range(info.total_episodes)}
     require_this_simulation(spec, versions, source=root, instead="")
     for index in range(info.total_episodes):

@@ -131,9 +131,7 @@ def _resimulate(recorded: EpisodeTable, session: SessionEpisode) -> Episode:
     return played
 
 
-def _write_completed(
-    root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path
-) -> None:
+def _write_completed(root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
     spec = read_info(root).spec
     columns = excav_features(spec)

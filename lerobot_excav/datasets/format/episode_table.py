@@ -126,9 +126,7 @@ class EpisodeTable:
                 f"that of {self.spec.env_type!r}"
             )
         if ids != (pair.scene_id, pair.target_id):
-            raise DatasetError(
-                f"episode {self.index}: scene and first target {ids} contradict {PAIR_KEY}={pair.uid!r}"
-            )
+            raise DatasetError(f"episode {self.index}: scene and first target {ids} contradict {PAIR_KEY}={pair.uid!r}")
         return pair
 
     def first_frame(self) -> "EpisodeTable":

@@ -91,9 +91,7 @@ class VideoSpan:
             stream = container.streams.video[0]
             time_base = stream.time_base
             assert time_base is not None  # of a file that holds pictures
-            container.seek(
-                round((self.start_s + number / self.fps) / time_base), backward=True, stream=stream
-            )
+            container.seek(round((self.start_s + number / self.fps) / time_base), backward=True, stream=stream)
             for picture in container.decode(stream):
                 found = round((float(picture.pts * time_base) - self.start_s) * self.fps)
                 if found == number:

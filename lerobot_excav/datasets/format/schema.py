@@ -53,9 +53,7 @@ def excav_features(spec: TaskSpec) -> dict[str, Feature]:
     }
 
 
-def dataset_features(
-    spec: TaskSpec, *, height: int, width: int, storage: str = "image"
-) -> dict[str, Feature]:
+def dataset_features(spec: TaskSpec, *, height: int, width: int, storage: str = "image") -> dict[str, Feature]:
     """Describe every column of a dataset in LeRobot's terms.
 
     Args:

@@ -1,7 +1,5 @@
 """Choosing episodes: paired, non-paired or balanced subsets of an index, without touching the dataset."""
 
-from typing import Literal
-
 import numpy as np
 import pandas as pd
 
@@ -9,8 +7,7 @@ from lerobot_excav.datasets.pairs.pair_coverage import pair_columns, start_colum
 from lerobot_excav.datasets.pairs.paired_index import FAILED
 from lerobot_excav.errors import DatasetError, require, require_choice
 
-Composition = Literal["all", "paired", "non-paired", "balanced"]
-COMPOSITIONS: tuple[Composition, ...] = ("all", "paired", "non-paired", "balanced")
+COMPOSITIONS = ("all", "paired", "non-paired", "balanced")
 
 
 def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFrame:
@@ -28,7 +25,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
 
 def select(
     index: pd.DataFrame,
-    composition: Composition,
+    composition: str,
     *,
     episodes: int | None = None,
     scenes: int | None = None,
@@ -59,17 +56,13 @@ def select(
         DatasetError: The index holds too few episodes.
     """
     require_choice("select", composition, COMPOSITIONS)
-    require(
-        episodes is None or scenes is None, "--episodes and --scenes exclude each other; give one of them"
-    )
+    require(episodes is None or scenes is None, "--episodes and --scenes exclude each other; give one of them")
     require(
         scenes is None or composition in ("paired", "non-paired"),
         f"--scenes has no meaning for --select={composition}; give --episodes",
     )
     if index.empty:
-        raise DatasetError(
-            "the index has no usable episode; successes are required unless --include_failures"
-        )
+        raise DatasetError("the index has no usable episode; successes are required unless --include_failures")
     shuffled = _shuffle_scenes(index, np.random.default_rng(seed))
     if composition == "paired":
         chosen = _paired(shuffled, episodes, scenes)
@@ -131,8 +124,7 @@ def _balanced(rows: pd.DataFrame, episodes: int | None) -> pd.DataFrame:
         )
         per_target = episodes // len(counts)
     groups = [
-        _first(group, per_target, f"episodes with target {target}")
-        for target, group in rows.groupby("target_id")
+        _first(group, per_target, f"episodes with target {target}") for target, group in rows.groupby("target_id")
     ]
     return pd.concat(groups)
 
@@ -142,7 +134,5 @@ def _first[Rows: (pd.DataFrame, pd.Series)](rows: Rows, count: int | None, what:
         return rows
     require(count >= 1, f"the number of {what} asked for is {count}; it must be at least 1")
     if count > len(rows):
-        raise DatasetError(
-            f"{count} {what} asked for, but only {len(rows)} are there; record more, or ask for fewer"
-        )
+        raise DatasetError(f"{count} {what} asked for, but only {len(rows)} are there; record more, or ask for fewer")
     return rows.iloc[:count]

@@ -43,9 +43,7 @@ class PlayedScenes:
         default="round",
         choices=TARGET_RULES,
     )
-    seed: int = setting(
-        "Seed of the operator's variations and of drawn targets", default=0, low=0, high=2**63 - 1
-    )
+    seed: int = setting("Seed of the operator's variations and of drawn targets", default=0, low=0, high=2**63 - 1)
 
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
@@ -70,9 +68,7 @@ class PlayedScenes:
         )
         for name in spec.settings.columns():
             value = getattr(self.env, name)
-            require(
-                isinstance(value, str), f"--env.{name}={value!r} cannot be kept in a dataset; give it by name"
-            )
+            require(isinstance(value, str), f"--env.{name}={value!r} cannot be kept in a dataset; give it by name")
 
     @property
     def task_spec(self) -> TaskSpec:
@@ -115,18 +111,14 @@ class DemonstrationSettings(PlayedScenes):
         default=None,
         choices=STORAGES,
     )
-    keep_failures: bool = setting(
-        "Whether episodes without success stay in the dataset, marked as such", default=False
-    )
+    keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.storage = self.storage or self.task_spec.storage
 
     @classmethod
-    def of(
-        cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any
-    ) -> "DemonstrationSettings":
+    def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":
         """Make settings of an environment named by its `--env.type`.
 
         Args:
@@ -172,9 +164,7 @@ class DemonstrationSettings(PlayedScenes):
             "choose another --out, or install the release of lerobot_env_excav that began it",
         )
         known = set(declared_settings(cls))
-        env = {
-            name.removeprefix("env."): values.pop(name) for name in list(values) if name.startswith("env.")
-        }
+        env = {name.removeprefix("env."): values.pop(name) for name in list(values) if name.startswith("env.")}
         unlike = sorted(values.keys() ^ known)
         require(not unlike, f"{source} has other settings ({', '.join(unlike)}); choose another --out")
         return cls.of(str(env_type), env, **values)
@@ -192,8 +182,7 @@ class DemonstrationSettings(PlayedScenes):
         for name, mine in self.as_record().items():
             if mine != theirs.get(name):
                 shown, there = (
-                    str(value).lower() if isinstance(value, bool) else value
-                    for value in (mine, theirs.get(name))
+                    str(value).lower() if isinstance(value, bool) else value for value in (mine, theirs.get(name))
                 )
                 raise ConfigurationError(
                     f"--{name}={shown} differs from the started run, which has {there}; "

@@ -95,9 +95,7 @@ def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: boo
     return provenance.outcomes
 
 
-def _fill(
-    partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool
-) -> list[Outcome]:
+def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
     pairs = settings.pairs()
     with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:

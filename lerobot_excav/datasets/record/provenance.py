@@ -37,8 +37,7 @@ def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list
         "operator": "scripted",
         "settings": settings.as_record(),
         "episodes": [
-            {**outcome, "seed": settings.episode_seed(Pair.parse(outcome["pair_uid"]))}
-            for outcome in outcomes
+            {**outcome, "seed": settings.episode_seed(Pair.parse(outcome["pair_uid"]))} for outcome in outcomes
         ],
     }
     (root / PROVENANCE_PATH).write_text(json.dumps(record, indent=1) + "\n")

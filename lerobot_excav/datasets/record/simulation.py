@@ -53,11 +53,12 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
     """Make the environment of some settings, with pictures or without."""
-    return task_of_settings(settings).make_env(
+    env: MaskedTaskEnv[Any, Any] = task_of_settings(settings).make_env(
         obs_type="pixels_agent_pos" if with_images else "agent_pos",
         render_mode="rgb_array" if with_images else None,
         **settings.as_dict(),
     )
+    return env
 
 
 def make_replay_environment(
@@ -72,9 +73,7 @@ def make_replay_environment(
         columns: Settings that datasets keep in every frame, by name.
         frames: Length of the recording.
     """
-    settings = spec.make_settings(
-        scene_set=scene_set, fps=fps, episode_length=spec.replay_length(frames), **columns
-    )
+    settings = spec.make_settings(scene_set=scene_set, fps=fps, episode_length=spec.replay_length(frames), **columns)
     return make_environment(settings, with_images=False)
 
 

@@ -79,9 +79,7 @@ class Bucket:
         """Volume that has entered and is not yet a parcel [m3]."""
         return 0.0 if self.intake is None else self.intake.waiting_m3
 
-    def move(
-        self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float
-    ) -> tuple[float, float]:
+    def move(self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float) -> tuple[float, float]:
         """Sweep the bucket from its last pose to this one.
 
         It takes in soil up to its heaped volume and pushes the rest ahead. A tool that was not there in the last step

@@ -40,9 +40,7 @@ def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> t
 
 
 @kernel
-def column_interval(
-    planes: Array, position: Array, rotation: Array, x: float, y: float
-) -> tuple[float, float, int]:
+def column_interval(planes: Array, position: Array, rotation: Array, x: float, y: float) -> tuple[float, float, int]:
     """Return the heights between which a vertical line is inside the bucket, and the face at the upper end.
 
     The interval is empty (low >= high) if the line misses the bucket.
@@ -78,9 +76,7 @@ def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[f
 
 
 @kernel
-def is_covered(
-    surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int
-) -> bool:
+def is_covered(surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int) -> bool:
     """Tell whether a surface height of a column lies inside the bucket or above it."""
     x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
     low, high, _ = column_interval(planes, position, rotation, x, y)
@@ -278,8 +274,6 @@ def set_ceiling(
             x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
             low, high, _ = column_interval(planes, position, rotation, x, y)
             new = low if low < high else math.inf
-            if new != ceiling[i, j] and (
-                new < heights[i, j] + grid.dx or ceiling[i, j] < heights[i, j] + grid.dx
-            ):
+            if new != ceiling[i, j] and (new < heights[i, j] + grid.dx or ceiling[i, j] < heights[i, j] + grid.dx):
                 mark_around(active, i, j)
             ceiling[i, j] = new

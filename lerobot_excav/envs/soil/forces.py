@@ -158,9 +158,7 @@ class SoilResistance:
         across = rotation @ -geometry.planes_t[1, :3]
         ahead = _ahead(rotation, along)
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
-        edges_t = np.stack(
-            [np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1
-        )
+        edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
         wedges, bearings = edge_limits(
             heights_m,

@@ -58,9 +58,7 @@ class Window(NamedTuple):
             return other
         if other.i1 <= other.i0 or other.j1 <= other.j0:
             return self
-        return Window(
-            min(self.i0, other.i0), max(self.i1, other.i1), min(self.j0, other.j0), max(self.j1, other.j1)
-        )
+        return Window(min(self.i0, other.i0), max(self.i1, other.i1), min(self.j0, other.j0), max(self.j1, other.j1))
 
 
 @kernel
@@ -163,9 +161,7 @@ class HeightField:
         """
         shape = self.heights.shape
         new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
-        require(
-            new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell."
-        )
+        require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
         require(
             bool(np.isfinite(new).all()),
             "heights_m holds values that are not finite; give metres above the floor.",

@@ -98,9 +98,7 @@ class LooseSoil:
     def clear(self) -> None:
         """Remove all parcels and forget the bucket."""
         self.population.clear()
-        self._tool = ToolPath(
-            0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3)
-        )
+        self._tool = ToolPath(0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3))
 
     def step(
         self,

@@ -162,6 +162,4 @@ class PlatePressure:
             self._soil,
             self._table,
         )
-        return Patches.alike(
-            points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE
-        )
+        return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

@@ -69,9 +69,7 @@ class Soil:
             preset = PRESETS[preset]
         require_choice("fidelity", fidelity, tuple(FIDELITIES))
         require(len(extent_m) == 2, f"extent_m={extent_m!r}; allowed: two lengths, along x and y.")
-        require(
-            0.0 <= floor_depth_m < math.inf, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above, finite."
-        )
+        require(0.0 <= floor_depth_m < math.inf, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above, finite.")
         require(seed >= 0, f"seed={seed!r}; allowed: 0 and above.")
         require(
             container is None or not container.overlaps(extent_m),
@@ -162,9 +160,7 @@ class Soil:
             self._out_of_bounds_m3 += lost
             self._give_birth(is_last=entered == 0.0 and load_m3 == 0.0)
         geometry = None if tool is None else tool.geometry
-        self._out_of_bounds_kg += self._loose.step(
-            geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0
-        )
+        self._out_of_bounds_kg += self._loose.step(geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0)
         sweeps = max(1, round(self.fidelity.sweeps_per_tick * dt_s / TICK_S))
         for field in (self._field, self._box_field):
             self._out_of_bounds_m3 += field.relax(sweeps, self.parameters.slope_tan)

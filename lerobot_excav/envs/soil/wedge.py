@@ -65,9 +65,7 @@ def wedge_area(
     """
     step = 0.5 * grid.dx
     area, reach = 0.0, 0.0
-    thickness = (
-        surface_height(heights, grid, edge[0] + ahead[0] * grid.dx, edge[1] + ahead[1] * grid.dx) - edge[2]
-    )
+    thickness = surface_height(heights, grid, edge[0] + ahead[0] * grid.dx, edge[1] + ahead[1] * grid.dx) - edge[2]
     while thickness > 0.0 and reach < _WEDGE_REACH_M:
         reach += step
         level = max(reach, grid.dx)
@@ -116,9 +114,7 @@ def wedge_force(
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
     failure, cohesion_factor, _ = table_row(table, rake)
     area = wedge_area(weighed, grid, edge, ahead, failure) + 0.5 * depth**2 / math.tan(rake)
-    balance = math.sin(failure + soil.friction) / math.sin(
-        rake + soil.steel_friction + failure + soil.friction
-    )
+    balance = math.sin(failure + soil.friction) / math.sin(rake + soil.steel_friction + failure + soil.friction)
     return float(soil.unit_weight * area * width * balance + soil.cohesion * depth * width * cohesion_factor)
 
 

@@ -17,6 +17,7 @@ from typing import Any
 from lerobot_excav.errors import ConfigurationError
 
 _METADATA_KEY = "setting"
+_ENDLESS = 2**31 - 1  # limits from here on are there for files and clocks, and need not be told
 _KIND_NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false", Path: "a path"}
 
 
@@ -54,7 +55,8 @@ class Allowed:
         if self.values is not None:
             return "one of " + ", ".join(map(str, self.values))
         if self.low is not None:
-            return f"from {self.low} on" if self.high is None else f"from {self.low} to {self.high}"
+            endless = self.high is None or self.high >= _ENDLESS
+            return f"from {self.low} on" if endless else f"from {self.low} to {self.high}"
         return ""
 
 
@@ -109,9 +111,7 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
     if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
         names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
         wanted = allowed.words if allowed.values is not None else f"{' or '.join(names)} {allowed.words}"
-        raise ConfigurationError(
-            f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip()
-        )
+        raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip())
 
 
 def _is_of(value: Any, kind: Any) -> bool:

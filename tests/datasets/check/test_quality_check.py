@@ -28,9 +28,7 @@ def tampered(paired_dataset, tmp_path):
         episodes = np.array(table["episode_index"].to_pylist())
         change(values, [np.flatnonzero(episodes == episode).tolist() for episode in range(19)])
         field = table.schema.field(key)
-        pq.write_table(
-            table.set_column(table.column_names.index(key), field, pa.array(values, field.type)), path
-        )
+        pq.write_table(table.set_column(table.column_names.index(key), field, pa.array(values, field.type)), path)
         return root
 
     return tamper
@@ -169,9 +167,7 @@ def test_sound_datasets_of_other_masks_pass(tmp_path, env, words):
 def test_views_with_and_without_overlay_may_be_merged(tmp_path):
     for name in ("plain", "tinted"):
         record_toy(tmp_path / name, scenes=1, env={"target_overlay": name == "tinted"})
-    merge_datasets(
-        [load(tmp_path / name) for name in ("tinted", "plain")], "local/m", output_dir=tmp_path / "m"
-    )
+    merge_datasets([load(tmp_path / name) for name in ("tinted", "plain")], "local/m", output_dir=tmp_path / "m")
     assert problems(tmp_path / "m") == {}
 
 
@@ -181,7 +177,5 @@ def test_an_empty_mask_is_found_unless_it_is_named_zero(tmp_path):
     table = pq.read_table(path)
     for words in ("oracle", "zero_shot"):
         column = pa.array([words] * len(table))
-        pq.write_table(
-            table.set_column(table.column_names.index(MASK_SOURCE_KEY), MASK_SOURCE_KEY, column), path
-        )
+        pq.write_table(table.set_column(table.column_names.index(MASK_SOURCE_KEY), MASK_SOURCE_KEY, column), path)
         assert problems(tmp_path / "d") == {0: "the target mask is empty from frame 0 on"}

@@ -62,9 +62,7 @@ def test_an_older_dataset_is_checked_but_not_replayed(mixed_dataset, monkeypatch
 
 
 def test_a_newer_dataset_is_not_replayed_but_for_what_this_version_recorded(mixed_dataset):
-    with pytest.raises(
-        DatasetError, match=r"episodes 19, 20, 21 and 1 more of version 2 .* this older package"
-    ):
+    with pytest.raises(DatasetError, match=r"episodes 19, 20, 21 and 1 more of version 2 .* this older package"):
         check_dataset(mixed_dataset, replays=1)
     assert set(check_dataset(mixed_dataset, episodes=range(19), replays=2)["qc"]) == {"passed"}
 

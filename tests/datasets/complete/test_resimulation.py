@@ -61,9 +61,7 @@ def session(recorded, tmp_path):
     return write
 
 
-def test_completing_a_recording_restores_what_the_simulation_knew(
-    recording, session, paired_dataset, tmp_path
-):
+def test_completing_a_recording_restores_what_the_simulation_knew(recording, session, paired_dataset, tmp_path):
     out = complete_recording(recording, session(), out=tmp_path / "c")
     pd.testing.assert_frame_equal(build_index(out), build_index(paired_dataset))
     for completed, original in zip(load(out), load(paired_dataset), strict=True):
@@ -76,9 +74,7 @@ def test_completing_a_recording_restores_what_the_simulation_knew(
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_a_recording_with_changed_commands_is_completed_from_either_storage(
-    changing_datasets, storage, tmp_path
-):
+def test_a_recording_with_changed_commands_is_completed_from_either_storage(changing_datasets, storage, tmp_path):
     recording, session = make_recording(changing_datasets[storage], tmp_path)
     complete_recording(recording, session)
     index = build_index(recording)
@@ -163,9 +159,7 @@ def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed
         complete_recording(recording, session({1: changes}), out=tmp_path / "c")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks simulation_v")]
-)
+@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks simulation_v")])
 def test_a_damaged_session_names_the_line(recording, tmp_path, text, message):
     (tmp_path / "s.jsonl").write_text(text)
     with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
@@ -176,9 +170,7 @@ def test_a_session_of_another_environment_is_refused(recording, recorded, tmp_pa
     lines = [json.loads(line) for line in recorded[1].read_text().splitlines()]
     lines[1] |= {"env": "fr5_grasp", "settings": {}}
     (tmp_path / "s.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-    with pytest.raises(
-        DatasetError, match="episode 1: the session is of fr5_grasp, the recording of toy_reach"
-    ):
+    with pytest.raises(DatasetError, match="episode 1: the session is of fr5_grasp, the recording of toy_reach"):
         complete_recording(recording, tmp_path / "s.jsonl", out=tmp_path / "c")
 
 

@@ -51,9 +51,7 @@ def test_lerobot_reads_the_pictures_that_were_played(dataset, storage, played):
         for camera, pictures in played.images.items():
             is_exact = storage == "image" or camera == "target_mask"
             tolerance = 0 if is_exact else COLOUR_TOLERANCE
-            np.testing.assert_allclose(
-                image(item, f"observation.images.{camera}"), pictures[frame], atol=tolerance
-            )
+            np.testing.assert_allclose(image(item, f"observation.images.{camera}"), pictures[frame], atol=tolerance)
 
 
 def test_episode_tables_read_what_lerobot_reads(dataset):

@@ -79,9 +79,7 @@ def test_the_index_survives_splitting_and_merging(request, fixture, tmp_path):
     assert index["pair_uid"].tolist()[:3] == original["pair_uid"][[1, 2, 6]].tolist()
 
 
-def test_the_stored_index_is_the_one_that_the_columns_give_and_a_stale_one_is_not_trusted(
-    paired_dataset, tmp_path
-):
+def test_the_stored_index_is_the_one_that_the_columns_give_and_a_stale_one_is_not_trusted(paired_dataset, tmp_path):
     expected = build_index(paired_dataset)
     pd.testing.assert_frame_equal(pd.read_parquet(paired_dataset / INDEX_PATH), expected)
     shutil.copytree(paired_dataset, tmp_path / "d")

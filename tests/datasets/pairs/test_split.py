@@ -55,9 +55,7 @@ def lerobot_split(root: Path, flags: list[str]) -> tuple[list[int], list[int]]:
         eval_split=float(values["eval_split"]),
         video_backend="pyav",
     )
-    train, evaluation = make_train_eval_datasets(
-        TrainPipelineConfig(dataset=dataset, policy=ACTConfig(device="cpu"))
-    )
+    train, evaluation = make_train_eval_datasets(TrainPipelineConfig(dataset=dataset, policy=ACTConfig(device="cpu")))
     return train.episodes, evaluation.episodes
 
 

@@ -20,9 +20,7 @@ TASK_FIELDS = [(spec.id, name) for spec in TASKS.values() for name in declared_s
 PLAYED_FIELDS = [(t, name) for t in env_types() for name in declared_settings(DemonstrationSettings)]
 
 numbers = st.one_of(
-    st.sampled_from(
-        [0, -1, 2**31 - 1, 2**31, 2**63, 10**40, -(10**400), 0.0, -0.0, 1e300, 5.0, math.nan, math.inf]
-    ),
+    st.sampled_from([0, -1, 2**31 - 1, 2**31, 2**63, 10**40, -(10**400), 0.0, -0.0, 1e300, 5.0, math.nan, math.inf]),
     st.integers(),
     st.floats(),
     st.sampled_from([np.float32(3), np.nan, np.array([1, 2]), np.array(3)]),
@@ -60,9 +58,7 @@ def outcome(make, name):
 def test_a_setting_of_a_task_is_declared_or_refused_by_its_name(task_id, name, value):
     spec = TASKS[task_id]
     # Whether there is such a task is asked by the environment only.
-    env = outcome(
-        lambda: spec.make_env(obs_type="agent_pos", **spec.make_settings(**{name: value}).as_dict()), name
-    )
+    env = outcome(lambda: spec.make_env(obs_type="agent_pos", **spec.make_settings(**{name: value}).as_dict()), name)
     if env is not None:
         assert is_declared(value, spec.settings, name)
         json.dumps(env.settings.as_dict())

@@ -21,9 +21,7 @@ from ..toy import CHANGE_FRAME, load, record_toy, toy_settings
 def contents(root: Path) -> dict[str, object]:
     """Read every file; of the tables the values, as their header holds a random cache key of the library."""
     return {
-        str(path.relative_to(root)): pq.read_table(path).to_pylist()
-        if path.suffix == ".parquet"
-        else path.read_bytes()
+        str(path.relative_to(root)): pq.read_table(path).to_pylist() if path.suffix == ".parquet" else path.read_bytes()
         for path in sorted(root.rglob("*"))
         if path.is_file()
     }
@@ -37,9 +35,7 @@ def test_frames_read_back_as_they_were_played(request, paired_dataset, changing_
     episode = play_demonstration(settings, settings.pairs()[5])
     items = list(load(changing_datasets["image"] if changes else paired_dataset, [5]))
     assert len(items) == episode.length
-    assert episode.target_id.tolist() == [1] * CHANGE_FRAME + [2 if changes else 1] * (
-        len(items) - CHANGE_FRAME
-    )
+    assert episode.target_id.tolist() == [1] * CHANGE_FRAME + [2 if changes else 1] * (len(items) - CHANGE_FRAME)
     for frame, item in enumerate(items):
         np.testing.assert_array_equal(item["observation.state"], episode.state[frame])
         np.testing.assert_array_equal(item["action"], episode.action[frame])

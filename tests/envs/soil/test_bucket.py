@@ -38,9 +38,7 @@ def test_the_heap_over_a_level_opening_is_a_hip_roof(length, width, slope):
     box = np.array([(length, 0.0), (length, 0.5), (0.0, 0.5), (0.0, 0.0)])
     geometry = ToolGeometry(profile_t=box, inner_width_m=width)
     heap = heaped_volume_m3(geometry, slope) - geometry.struck_volume_m3
-    x, y = np.meshgrid(
-        (np.arange(500) + 0.5) / 500 * length, (np.arange(500) + 0.5) / 500 * width, indexing="ij"
-    )
+    x, y = np.meshgrid((np.arange(500) + 0.5) / 500 * length, (np.arange(500) + 0.5) / 500 * width, indexing="ij")
     roof = slope * np.minimum(np.minimum(x, length - x), np.minimum(y, width - y))
     assert heap == pytest.approx(roof.mean() * length * width, rel=1e-3)
 

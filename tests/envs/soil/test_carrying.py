@@ -27,12 +27,7 @@ def filled(fidelity="fast", count=60):
     soil, tool = Soil(fidelity=fidelity), held()
     soil.step(TICK_S, tool)
     lattice = np.array(
-        [
-            (x, y, z)
-            for z in (0.1, -0.1, -0.3, -0.5)
-            for y in (-0.2, 0.0, 0.2)
-            for x in np.linspace(0.4, 0.9, 5)
-        ]
+        [(x, y, z) for z in (0.1, -0.1, -0.3, -0.5) for y in (-0.2, 0.0, 0.2) for x in np.linspace(0.4, 0.9, 5)]
     )
     start = tool.position_w + lattice[:count] @ tool.rotation_w.T
     soil.add_parcels(start, np.zeros_like(start))
@@ -78,9 +73,7 @@ def test_the_payload_has_its_mass_and_centre_in_the_reaction():
     reaction = soil.step(TICK_S, tool)
     masses = soil.parcel_masses_kg
     assert reaction.payload_mass_kg == pytest.approx(masses.sum())
-    np.testing.assert_allclose(
-        reaction.payload_com_t, masses @ places_t(soil, tool) / masses.sum(), atol=1e-12
-    )
+    np.testing.assert_allclose(reaction.payload_com_t, masses @ places_t(soil, tool) / masses.sum(), atol=1e-12)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])

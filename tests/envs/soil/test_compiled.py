@@ -10,7 +10,9 @@ from lerobot_excav.envs.soil import compiled
 CALLER = """
 from lerobot_excav.envs.soil.compiled import kernel
 from digest_probe.envs.callee import inner
-from digest_probe.envs.numbers import OFFSET
+from digest_probe.envs import numbers
+
+OFFSET = numbers.OFFSET
 
 @kernel
 def outer(x):
@@ -27,12 +29,13 @@ def inner(x):
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A package in which a kernel of one file calls one of another file and uses a constant of a third."""
+    """A kernel of one file calls one of another file and uses a constant that a third file has from a fourth."""
     envs = tmp_path / "digest_probe" / "envs"
     envs.mkdir(parents=True)
     (envs / "caller.py").write_text(CALLER)
     (envs / "callee.py").write_text(CALLEE.format(added=1.0))
-    (envs / "numbers.py").write_text("OFFSET = 0.0\n")
+    (envs / "numbers.py").write_text("from digest_probe.envs.shared import OFFSET\n")
+    (envs / "shared.py").write_text("OFFSET = 0.0\n")
     (envs / "notes.py").write_text("NOTHING = 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(compiled, "_SOURCES", envs)
@@ -62,7 +65,7 @@ def test_a_change_of_a_called_kernel_or_a_constant_in_another_file_is_seen(packa
     assert result(monkeypatch) == 4.0
     rewrite(package / "callee.py", CALLEE.format(added=5.0))
     assert result(monkeypatch) == 12.0
-    rewrite(package / "numbers.py", "OFFSET = 0.5\n")
+    rewrite(package / "shared.py", "OFFSET = 0.5\n")
     assert result(monkeypatch) == 12.5
 
 
@@ -75,6 +78,10 @@ def test_compiled_code_is_kept_beside_the_sources_under_their_digest(package, mo
     assert compiled._cache_directory() == first
     rewrite(package / "callee.py", CALLEE.format(added=7.0))
     assert compiled._cache_directory() != first
+
+
+def test_the_shared_constants_belong_to_the_kernels():
+    assert any("GRAVITY_M_S2 = " in source for source in compiled._kernel_sources())
 
 
 def test_where_sources_cannot_be_written_the_user_cache_is_used(package, monkeypatch, tmp_path):

@@ -8,9 +8,7 @@ from lerobot_excav.errors import ConfigurationError
 
 
 def box(x=0.0, y=0.0, yaw=0.0):
-    return Container(
-        center_w=np.array([x, y, 0.0]), half_extent_m=np.array([1.0, 0.5]), wall_height_m=1.0, yaw_rad=yaw
-    )
+    return Container(center_w=np.array([x, y, 0.0]), half_extent_m=np.array([1.0, 0.5]), wall_height_m=1.0, yaw_rad=yaw)
 
 
 def test_local_axes_turn_with_the_yaw():

@@ -33,9 +33,7 @@ def test_a_smooth_vertical_wall_meets_rankine():
     angle = failure_angle(math.pi / 2, FRICTION, 0.0)
     passive = math.tan(math.pi / 4 + FRICTION / 2) ** 2
     assert angle == pytest.approx(math.pi / 4 - FRICTION / 2, abs=1e-4)
-    assert 2.0 * earthmoving_factors(math.pi / 2, angle, FRICTION, 0.0).weight == pytest.approx(
-        passive, rel=1e-6
-    )
+    assert 2.0 * earthmoving_factors(math.pi / 2, angle, FRICTION, 0.0).weight == pytest.approx(passive, rel=1e-6)
 
 
 def test_the_table_holds_the_same_angles():

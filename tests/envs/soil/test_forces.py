@@ -78,9 +78,7 @@ def test_cohesion_adds_its_term():
     sticky = dataclasses.replace(SAND, cohesion_pa=2000.0)
     rake, depth = math.radians(40.0), 0.3
     failure = failure_angle(rake, SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
-    factor = earthmoving_factors(
-        rake, failure, SAND.friction_angle_rad, SAND.steel_friction_angle_rad
-    ).cohesion
+    factor = earthmoving_factors(rake, failure, SAND.friction_angle_rad, SAND.steel_friction_angle_rad).cohesion
     more = force(sticky, flat(), dragged(40, depth), PatchKind.WEDGE)
     more -= force(SAND, flat(), dragged(40, depth), PatchKind.WEDGE)
     assert np.linalg.norm(more) == pytest.approx(2000.0 * depth * BUCKET.inner_width_m * factor, rel=0.01)
@@ -142,16 +140,13 @@ def test_what_the_soil_can_hold_depends_on_the_pose_and_not_on_the_motion(pitch,
     motion = np.array([math.cos(angle), 0.0, math.sin(angle)])
     moving = react(SAND, flat(), tool_at(edge, pitch, motion, 0.0)).patches
     for kind in (PatchKind.WEDGE, PatchKind.PENETRATION):
-        np.testing.assert_array_equal(
-            moving.of_kind(kind).full_forces_w_n, still.of_kind(kind).full_forces_w_n
-        )
+        np.testing.assert_array_equal(moving.of_kind(kind).full_forces_w_n, still.of_kind(kind).full_forces_w_n)
 
 
 def test_the_force_is_continuous_in_the_direction_of_a_deep_scrape():
     angles = np.radians(np.arange(90.0, 271.0, 0.25))
     deep = [
-        force(SAND, flat(), dragged(20, 0.8, np.array([math.cos(a), 0.0, math.sin(a)])), *PatchKind)
-        for a in angles
+        force(SAND, flat(), dragged(20, 0.8, np.array([math.cos(a), 0.0, math.sin(a)])), *PatchKind) for a in angles
     ]
     jumps = np.linalg.norm(np.diff(deep, axis=0), axis=1)
     assert jumps.max() < 0.05 * np.linalg.norm(deep, axis=1).max()

@@ -49,44 +49,6 @@ def test_each_parcel_brings_its_mass_and_lands_where_it_falls():
         assert ledger[place] == pytest.approx(soil.parcel_mass_kg)
 
 
-@given(
-    seed=st.integers(0, 999),
-    floor=st.sampled_from([0.0, 0.3]),
-    preset=st.sampled_from(["sand", "gravel", "dirt", "wet_sand"]),
-)
-@settings(max_examples=10)
-def test_a_rain_of_parcels_keeps_every_gram(seed, floor, preset):
-    rng = np.random.default_rng(seed)
-    soil = Soil(preset, container=TILTED, floor_depth_m=floor, fidelity="fast")
-    soil.reset(floor + rng.uniform(0.0, 0.2, (120, 120)))
-    positions = np.column_stack(
-        [rng.uniform(2.0, 6.5, 150), rng.uniform(-1.0, 2.0, 150), rng.uniform(0.1, 2.0, 150)]
-    )
-    before = sum(soil.ledger_kg().values())
-    soil.add_parcels(positions, rng.uniform(-3.0, 3.0, (150, 3)))
-    total = before + 150 * soil.parcel_mass_kg
-    for _ in range(100):
-        soil.step(TICK_S)
-        ledger = soil.ledger_kg()
-        assert sum(ledger.values()) == pytest.approx(total, abs=1e-6)
-        assert min(ledger.values()) >= 0.0
-    assert ledger["parcels"] < 0.2 * 150 * soil.parcel_mass_kg
-
-
-def test_a_wall_stops_a_parcel_from_outside_and_from_inside():
-    soil = Soil(container=TILTED)
-    axis = TILTED.axes_w[0]
-    outside, inside = TILTED.center_w[:2] + 1.3 * axis, TILTED.center_w[:2]
-    speed = 8.0 * axis
-    soil.add_parcels([[*outside, 0.7]], [[*-speed, 0.0]])
-    fall(soil, 1.5)
-    assert soil.ledger_kg()["box"] == 0.0
-    assert soil.ledger_kg()["out_of_bounds"] == pytest.approx(soil.parcel_mass_kg)
-    soil.add_parcels([[*inside, 0.7]], [[*speed, 0.0]])
-    fall(soil, 1.5)
-    assert soil.ledger_kg()["box"] == pytest.approx(soil.parcel_mass_kg)
-
-
 def test_a_parcel_above_the_wall_flies_over_it():
     soil = Soil(container=TILTED)
     axis = TILTED.axes_w[0]
@@ -116,9 +78,7 @@ def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
 
 
 def test_soil_heaped_above_the_wall_runs_out_of_the_box():
-    small = Container(
-        center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0
-    )
+    small = Container(center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0)
     soil = Soil(container=small)
     for _ in range(100):
         soil.add_parcels([[4.0, 0.0, 0.9]], np.zeros((1, 3)))

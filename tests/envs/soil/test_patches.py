@@ -88,9 +88,7 @@ def test_patches_that_hold_nothing_are_left_out():
 
 
 def test_joined_patches_can_be_told_apart_by_kind():
-    joined = Patches.joined(
-        floor_patch(), Patches.alike(np.zeros((1, 3)), UP[None], np.ones(1), 0.0, PatchKind.WEDGE)
-    )
+    joined = Patches.joined(floor_patch(), Patches.alike(np.zeros((1, 3)), UP[None], np.ones(1), 0.0, PatchKind.WEDGE))
     assert len(joined) == 2
     assert joined.of_kind(PatchKind.WEDGE).limits_n == pytest.approx([1.0])
     assert joined.of_kind(PatchKind.PRESSURE).limits_n == pytest.approx([1000.0])

@@ -82,9 +82,7 @@ def test_overlaps_are_those_of_a_plain_look_at_the_ground(seed):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     looked = points[:, :2] + 0.05 * normals[:, :2]
     expected = np.where(field.contains(looked), np.maximum(0.0, field.sample(looked) - points[:, 2]), 0.0)
-    np.testing.assert_allclose(
-        plate_overlaps(field.heights, field.grid, points, normals), expected, atol=1e-12
-    )
+    np.testing.assert_allclose(plate_overlaps(field.heights, field.grid, points, normals), expected, atol=1e-12)
 
 
 def test_a_plate_that_sinks_meets_the_measured_pressure_of_dry_sand():

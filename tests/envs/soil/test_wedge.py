@@ -51,9 +51,7 @@ def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
 
 def test_rakes_beyond_the_table_count_as_its_ends():
     for inside, outside in ((20.0, -30.0), (90.0, 100.0), (90.0, 170.0)):
-        assert table_row(TABLE, math.radians(outside)) == pytest.approx(
-            table_row(TABLE, math.radians(inside))
-        )
+        assert table_row(TABLE, math.radians(outside)) == pytest.approx(table_row(TABLE, math.radians(inside)))
     edges = np.array([[0.0, 0.0, 0.7]])
     assert limits(flat(), edges, rake_deg=120.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=90.0)[0])
     assert limits(flat(), edges, rake_deg=5.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=20.0)[0])

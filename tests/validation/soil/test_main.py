@@ -18,9 +18,7 @@ def asked(monkeypatch):
             conditions.append((code, given))
             return Result(checks=(Check("mass", value, "kg", high=1.0),))
 
-        return SoilExperiment(
-            code=code, title=code, source="", measures="", gate="", run=run, is_timed=is_timed
-        )
+        return SoilExperiment(code=code, title=code, source="", measures="", gate="", run=run, is_timed=is_timed)
 
     experiments = (one("T1", 0.5), one("T2", 2.0), one("T3", 2.0, is_timed=True))
     monkeypatch.setattr(catalogue, "EXPERIMENTS", experiments)

@@ -2,8 +2,8 @@ import re
 from pathlib import Path
 
 import pytest
-
 from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+
 from lerobot_excav.errors import ConfigurationError
 from validation.soil.catalogue import EXPERIMENTS, chosen
 from validation.soil.experiment import Conditions, SoilExperiment
@@ -52,9 +52,7 @@ def test_a_missed_gate_is_told_with_its_distance_and_its_reason():
 
 
 def test_the_report_names_the_version_of_the_simulation():
-    assert f"version {SIMULATION_VERSION} of the simulation" in report_text(
-        [(experiment(), RESULT)], Conditions()
-    )
+    assert f"version {SIMULATION_VERSION} of the simulation" in report_text([(experiment(), RESULT)], Conditions())
 
 
 def test_a_miss_that_nobody_has_explained_says_so():
@@ -102,9 +100,7 @@ def test_codes_are_unique():
     assert len(set(codes)) == len(codes)
 
 
-@pytest.mark.parametrize(
-    ("field", "value"), [("preset", "mud"), ("fidelity", "best"), ("seeds", ()), ("seeds", (-1,))]
-)
+@pytest.mark.parametrize(("field", "value"), [("preset", "mud"), ("fidelity", "best"), ("seeds", ()), ("seeds", (-1,))])
 def test_conditions_that_cannot_be_are_refused(field, value):
     with pytest.raises(ConfigurationError, match=field.replace("preset", "soil")):
         Conditions(**{field: value})

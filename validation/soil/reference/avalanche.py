@@ -11,11 +11,7 @@ Array = NDArray[np.float64]
 
 
 def sweep(
-    heights: Array,
-    ceiling: Array,
-    cell_m: tuple[float, float],
-    slope_tan: float,
-    border_height: float,
+    heights: Array, ceiling: Array, cell_m: tuple[float, float], slope_tan: float, border_height: float
 ) -> tuple[Array, float]:
     """Return the heights after one avalanche sweep of all columns, and the height that ran over the border."""
     nx, ny = heights.shape

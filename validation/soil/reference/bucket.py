@@ -11,9 +11,7 @@ def inside(planes: Array, points_t: Array) -> NDArray[np.bool_]:
     return np.asarray((points_t @ planes[:, :3].T <= planes[:, 3]).all(axis=1))
 
 
-def column_interval(
-    planes: Array, position: Array, rotation: Array, xy: Array, z: Array
-) -> tuple[float, float] | None:
+def column_interval(planes: Array, position: Array, rotation: Array, xy: Array, z: Array) -> tuple[float, float] | None:
     """Return the lowest and highest of (n,) heights at which a vertical line is inside, or None."""
     points = np.column_stack([np.full_like(z, xy[0]), np.full_like(z, xy[1]), z])
     hit = inside(planes, (points - position) @ rotation)

@@ -19,9 +19,7 @@ from lerobot_excav.envs.soil.parcels.contact import (
 Array = NDArray[np.float64]
 
 
-def normal_force(
-    overlap: float, separation_speed: float, stiffness: float, mass: float, radius: float
-) -> float:
+def normal_force(overlap: float, separation_speed: float, stiffness: float, mass: float, radius: float) -> float:
     """Return spring plus dashpot [N], faded out at the separation speed and never pulling."""
     spring = stiffness * min(overlap, LARGEST_OVERLAP * radius)
     dashpot = 2.0 * NORMAL_DAMPING * math.sqrt(stiffness * mass) * separation_speed
@@ -59,12 +57,8 @@ def contact(
     pressing = normal_force(overlap, float(velocity @ normal), normal_stiffness, mass, radius)
     stiffness = TANGENTIAL_STIFFNESS * normal_stiffness
     damping = 2.0 * TANGENTIAL_DAMPING * math.sqrt(stiffness * mass)
-    slide, springs[:3] = stretch(
-        springs[:3], normal, velocity, stiffness, damping, law.sliding * pressing, dt
-    )
-    roll, springs[3:] = stretch(
-        springs[3:], normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt
-    )
+    slide, springs[:3] = stretch(springs[:3], normal, velocity, stiffness, damping, law.sliding * pressing, dt)
+    roll, springs[3:] = stretch(springs[3:], normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt)
     largest_push = normal_stiffness * LARGEST_OVERLAP * radius
     cohesion = min(law.cohesion * math.pi * radius**2, MOST_COHESION * largest_push)
     return (pressing - cohesion) * normal + slide, roll
@@ -85,14 +79,6 @@ def wall_contact(
     arm = -gap * normal
     rolling_velocity = np.asarray(-radius * np.cross(normal, spin), dtype=np.float64)
     force, roll = contact(
-        springs,
-        normal,
-        radius - gap,
-        velocity + np.cross(spin, arm),
-        rolling_velocity,
-        mass,
-        radius,
-        law,
-        dt,
+        springs, normal, radius - gap, velocity + np.cross(spin, arm), rolling_velocity, mass, radius, law, dt
     )
     return force, np.cross(arm, force) + radius * np.cross(normal, roll)

@@ -35,9 +35,7 @@ def integrate(state: State, dt: float) -> None:
         state.positions[i] += dt * state.velocities[i]
 
 
-def advance(
-    state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws, dt: float, steps: int
-) -> float:
+def advance(state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws, dt: float, steps: int) -> float:
     """Advance all parcels by some sub-steps; return the fastest hit on a sleeping parcel [m/s]."""
     hit = 0.0
     state.ground[:] = TOUCHES_NOTHING

@@ -21,8 +21,7 @@ def neighbours(positions: Array, radii: Array, asleep: NDArray[np.uint8]) -> set
     return {
         (i, j)
         for i, j in combinations(range(len(positions)), 2)
-        if np.linalg.norm(positions[i] - positions[j]) < radii[i] + radii[j] + skin
-        and not (asleep[i] and asleep[j])
+        if np.linalg.norm(positions[i] - positions[j]) < radii[i] + radii[j] + skin and not (asleep[i] and asleep[j])
     }
 
 

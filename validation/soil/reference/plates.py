@@ -14,12 +14,16 @@ _DEEP_M = 100.0
 """How far box walls reach down: parcels below the floor of the box meet them too."""
 
 
-def bucket_polygons(tool: ToolPath) -> list[Array]:
+def plate_polygons(profile: Array, half_width: float) -> list[Array]:
     """Return the corners (k, 3) of each plate in the tool frame: shell from edge to lip, right side, left side."""
-    half = tool.half_width
-    right, left = (np.insert(tool.profile, 1, y, axis=1) for y in (-half, half))
-    shell = [np.array([right[k], right[k + 1], left[k + 1], left[k]]) for k in range(len(tool.profile) - 1)]
+    right, left = (np.insert(profile, 1, y, axis=1) for y in (-half_width, half_width))
+    shell = [np.array([right[k], right[k + 1], left[k + 1], left[k]]) for k in range(len(profile) - 1)]
     return [*shell, right, left]
+
+
+def bucket_polygons(tool: ToolPath) -> list[Array]:
+    """Return the plates of a bucket, as `plate_polygons` does."""
+    return plate_polygons(tool.profile, tool.half_width)
 
 
 def box_polygons(box: BoxWalls) -> list[Array]:

@@ -192,9 +192,7 @@ class ExcavatorMachine:
 def _checked_joint_pos(joint_pos: object) -> NDArray[np.float64]:
     array = np.asarray(joint_pos, dtype=np.float64)
     if array.shape != (4,):
-        raise ConfigurationError(
-            f"joint_pos has shape {array.shape}; allowed: (4,) for {', '.join(const.JOINT_NAMES)}"
-        )
+        raise ConfigurationError(f"joint_pos has shape {array.shape}; allowed: (4,) for {', '.join(const.JOINT_NAMES)}")
     for name, value, (lower, upper) in zip(const.JOINT_NAMES, array, const.JOINT_RANGE_RAD, strict=True):
         if not lower - 1e-9 <= value <= upper + 1e-9:
             raise ConfigurationError(

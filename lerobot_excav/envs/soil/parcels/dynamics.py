@@ -106,9 +106,7 @@ def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
             if asleep[i] != asleep[j]:
                 mass = masses[j] if asleep[i] else masses[i]
                 hit = max(hit, -dot(velocity, n))
-            force, roll = contact(
-                springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt
-            )
+            force, roll = contact(springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt)
             torque, rolling_torque = cross(n, force), cross(n, roll)
             for a in range(3):
                 forces[i, a] += force[a]

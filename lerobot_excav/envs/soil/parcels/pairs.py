@@ -105,9 +105,7 @@ def _more_room(pairs: Pairs) -> Pairs:
     first[: room // 2], second[: room // 2] = pairs.first, pairs.second
     partner, closed = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.uint8)
     springs = np.zeros((room, SPRINGS))
-    return Pairs(
-        pairs.start, partner, closed, springs, pairs.anchors, first, second, pairs.last, pairs.before
-    )
+    return Pairs(pairs.start, partner, closed, springs, pairs.anchors, first, second, pairs.last, pairs.before)
 
 
 @kernel

@@ -286,9 +286,7 @@ def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> N
             velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
             velocity = keep_out(positions, velocities, i, normal, gap, r, velocity, dt)
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-            force, torque = wall_contact(
-                springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
-            )
+            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt)
             for a in range(3):
                 state.forces[i, a] += force[a]
                 state.torques[i, a] += torque[a]

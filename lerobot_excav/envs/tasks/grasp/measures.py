@@ -76,7 +76,7 @@ def grasp_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
 
 def grasp_summary(index: "pd.DataFrame") -> str:
     """Describe the outcomes of an index."""
-    took_target = int((index["first_grasped_block"] == index["target_id"]).sum())
+    took_target = int((index["first_grasped_block"] == index["final_target_id"]).sum())
     return f"first block taken: the commanded one in {took_target} of {len(index)}"
 
 
@@ -100,9 +100,7 @@ GRASP_MEASURES = TaskMeasures(
         Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
         Column(key="episode_return", header="return", kind=Kind.MEAN, field="episode_return"),
         Column(key="grasped", header="grasped any [%]", kind=Kind.RATE, field="has_grasped"),
-        Column(
-            key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"
-        ),
+        Column(key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"),
         Column(key="mask_followed", header="mask followed [%]", kind=Kind.RATE, field="mask_followed"),
         Column(key="placed", header="placed [%]", kind=Kind.RATE, field="placed"),
         Column(key="first_grasped", header="first grasped", kind=Kind.COUNTS, field="grasped", words=GRASPED),

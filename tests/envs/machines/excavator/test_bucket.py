@@ -7,9 +7,7 @@ from lerobot_excav.envs.soil.bucket import heaped_volume_m3
 
 
 def test_heaped_volume_is_that_of_the_datasheet():
-    assert heaped_volume_m3(bucket_geometry(), slope_tan=1.0) == pytest.approx(
-        const.BUCKET_HEAPED_VOLUME_M3, rel=0.005
-    )
+    assert heaped_volume_m3(bucket_geometry(), slope_tan=1.0) == pytest.approx(const.BUCKET_HEAPED_VOLUME_M3, rel=0.005)
 
 
 def test_struck_volume_follows_from_the_cross_section():

@@ -90,9 +90,7 @@ def works_of_substeps(machine, resistance, ctrl_at, ticks, renew):
         resistance.apply(data)
         applied = data.qfrc_applied.copy()
         mujoco.mj_step2(model, data)
-        works.append(
-            float(applied @ data.qvel) * const.SUBSTEP_S
-        )  # qvel is what moves the joints in this step
+        works.append(float(applied @ data.qvel) * const.SUBSTEP_S)  # qvel is what moves the joints in this step
     return np.array(works)
 
 
@@ -184,9 +182,7 @@ def test_a_moving_bucket_feels_the_patch_in_full_where_it_is(machine):
     data.qfrc_applied[:] = 0.0
     resistance.apply(data)
     jacobian = np.zeros((3, 4))
-    mujoco.mj_jac(
-        machine.model, data, jacobian, None, machine.cutting_edge_pos_w, machine.model.body("bucket").id
-    )
+    mujoco.mj_jac(machine.model, data, jacobian, None, machine.cutting_edge_pos_w, machine.model.body("bucket").id)
     np.testing.assert_allclose(data.qfrc_applied, jacobian.T @ [1e3, 0.0, 0.0], rtol=1e-9, atol=1e-6)
     np.testing.assert_allclose(resistance.force_w_n, [1e3, 0.0, 0.0], atol=1e-6)
 

@@ -30,9 +30,7 @@ def energy(state):
 
 @given(seed=st.integers(0, 2**16), cohesion=st.sampled_from([0.0, 2100.0]), has_tool=st.booleans())
 @settings(max_examples=25)
-def test_sub_steps_are_those_of_the_reference(
-    random_state, tool_path, site, laws, run, seed, cohesion, has_tool
-):
+def test_sub_steps_are_those_of_the_reference(random_state, tool_path, site, laws, run, seed, cohesion, has_tool):
     """A crowd in a moving bucket above a box and rough ground: all contacts at once."""
     rng, steps = np.random.default_rng(seed), 8
     laws = laws._replace(parcel=laws.parcel._replace(cohesion=cohesion))
@@ -46,9 +44,7 @@ def test_sub_steps_are_those_of_the_reference(
     hit = run(state, steps, ground, tool, laws)
     expected = reference.advance(twin, memory, tool, ground, laws, DT, steps)
     for name in ("positions", "velocities", "spins", "ground_springs", "plate_springs"):
-        np.testing.assert_allclose(
-            getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name
-        )
+        np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_array_equal(state.ground, twin.ground)
     np.testing.assert_array_equal(state.shell, twin.shell)
     assert hit == pytest.approx(expected, abs=1e-9)
@@ -121,9 +117,7 @@ def test_a_parcel_that_cannot_roll_slides_above_the_friction_angle_as_coulomb_sa
 
 
 @pytest.mark.parametrize("rolling", [0.2, 0.5])
-def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(
-    make_state, site, laws, run, rolling
-):
+def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(make_state, site, laws, run, rolling):
     law = Law(STIFFNESS, 2.0, rolling, 0.0)
     moved = []
     for angle in (math.atan(rolling) - 0.02, math.atan(rolling) + 0.05):
@@ -158,11 +152,7 @@ def pyramid(make_state, layers=3):
         width = layers - level
         start = -(width - 1) * RADIUS
         height = RADIUS + level * RADIUS * math.sqrt(2.0)
-        points += [
-            (start + 2 * RADIUS * i, start + 2 * RADIUS * j, height)
-            for i in range(width)
-            for j in range(width)
-        ]
+        points += [(start + 2 * RADIUS * i, start + 2 * RADIUS * j, height) for i in range(width) for j in range(width)]
     return make_state(points)
 
 
@@ -236,15 +226,11 @@ def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, ru
     travel = steps * 0.2 * RADIUS * way / np.linalg.norm(way)
     whole = tool_path((0.0, 0.0, 5.0), rng.uniform(-3.1, 3.1), travel, 0.0, steps)
     plates = bucket_polygons(whole)
-    aims = np.array(
-        [rng.dirichlet(np.ones(len(p))) @ p for p in (plates[k % len(plates)] for k in range(count))]
-    )
+    aims = np.array([rng.dirichlet(np.ones(len(p))) @ p for p in (plates[k % len(plates)] for k in range(count))])
     flight = rng.normal(0.0, 1.0, (count, 3))
     flight /= np.linalg.norm(flight, axis=1)[:, None]
     starts = aims - rng.uniform(1.0, 3.0, (count, 1)) * RADIUS * flight
-    keep = [
-        min(np.linalg.norm(q - nearest_point(plate, q)) for plate in plates) > 0.5 * RADIUS for q in starts
-    ]
+    keep = [min(np.linalg.norm(q - nearest_point(plate, q)) for plate in plates) > 0.5 * RADIUS for q in starts]
     rotation = whole.rotations[0]
     state = make_state(
         whole.positions[0] + starts[keep] @ rotation.T,

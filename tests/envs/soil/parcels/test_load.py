@@ -41,10 +41,7 @@ def test_the_load_is_that_of_the_reference(random_state, tool_path, seed, pitch,
     state.ground[:] = TOUCHES_GROUND * (rng.random(40) < 0.02)
     mass, square_speed, _, touching = find_load(state, tool)
     expected = np.array(
-        [
-            is_load(tool, p, v, r)
-            for p, v, r in zip(state.positions, state.velocities, state.radii, strict=True)
-        ]
+        [is_load(tool, p, v, r) for p, v, r in zip(state.positions, state.velocities, state.radii, strict=True)]
     )
     np.testing.assert_array_equal(state.load == 1, expected)
     assert mass == pytest.approx(state.masses[expected].sum())
@@ -106,9 +103,7 @@ def test_parcels_put_to_sleep_keep_their_place_in_the_bucket_and_forget_their_co
     np.testing.assert_array_equal(state.asleep, [1, 1, 0])
     back = tool.positions[0] + state.places_t[:2] @ tool.rotations[0].T
     np.testing.assert_allclose(back, state.positions[:2], atol=1e-12)
-    np.testing.assert_allclose(
-        state.places_t[:2], places_in(tool.positions[0], tool.rotations[0], state.positions[:2])
-    )
+    np.testing.assert_allclose(state.places_t[:2], places_in(tool.positions[0], tool.rotations[0], state.positions[:2]))
     assert not state.plate_springs[:2].any()
     assert not state.ground_springs[:2].any()
     assert state.plate_springs[2].all()
@@ -153,29 +148,19 @@ def test_a_load_that_is_busy_stays_awake(make_state, tool_path, why):
         assert not state.asleep.any()
 
 
-def test_cutting_wakes_the_load(make_state, tool_path):
+@pytest.mark.parametrize(("hit", "cutting", "wakes"), [(0.9, False, False), (1.1, False, True), (0.0, True, True)])
+def test_a_hard_hit_and_cutting_wake_the_load_and_a_soft_hit_does_not(make_state, tool_path, hit, cutting, wakes):
     tool = tool_path(pitch=CARRY)
     state, rest = asleep_in(make_state, tool)
-    rest.update(state, tool, TICK_S, 0.0, cutting=True)
-    assert not state.asleep.any()
-
-
-def test_a_hard_hit_wakes_the_load_and_a_soft_one_does_not(make_state, tool_path):
-    tool = tool_path(pitch=CARRY)
-    state, rest = asleep_in(make_state, tool)
-    rest.update(state, tool, TICK_S, 0.9 * WAKING_SPEED_M_S, cutting=False)
-    assert state.asleep.all()
-    rest.update(state, tool, TICK_S, 1.1 * WAKING_SPEED_M_S, cutting=False)
-    assert not state.asleep.any()
+    rest.update(state, tool, TICK_S, hit * WAKING_SPEED_M_S, cutting=cutting)
+    assert state.asleep.all() != wakes
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_tilt_wakes_the_load_however_slowly_it_comes(make_state, tool_path, sign):
     state, rest = asleep_in(make_state, tool_path(pitch=CARRY))
     for share in (0.3, 0.6, 0.95):
-        rest.update(
-            state, tool_path(pitch=CARRY + sign * share * WAKING_TILT_RAD), TICK_S, 0.0, cutting=False
-        )
+        rest.update(state, tool_path(pitch=CARRY + sign * share * WAKING_TILT_RAD), TICK_S, 0.0, cutting=False)
         assert state.asleep.all()
     rest.update(state, tool_path(pitch=CARRY + sign * 1.05 * WAKING_TILT_RAD), TICK_S, 0.0, cutting=False)
     assert not state.asleep.any()

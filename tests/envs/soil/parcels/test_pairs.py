@@ -13,17 +13,13 @@ DT = 0.001
 
 
 def listed(pairs, count):
-    return [
-        (i, int(pairs.partner[k])) for i in range(count) for k in range(pairs.start[i], pairs.start[i + 1])
-    ]
+    return [(i, int(pairs.partner[k])) for i in range(count) for k in range(pairs.start[i], pairs.start[i + 1])]
 
 
 def first_list(state, room=None):
     count = len(state.masses)
     none = np.full(count, -1, dtype=np.int64)
-    return find_pairs(
-        state.positions, state.radii, state.asleep, room_for(count), none, room or room_for(count)
-    )
+    return find_pairs(state.positions, state.radii, state.asleep, room_for(count), none, room or room_for(count))
 
 
 @given(seed=st.integers(0, 2**16), count=st.integers(1, 40), size=st.sampled_from([0.1, 0.3, 1.0, 4.0]))
@@ -128,9 +124,7 @@ def test_memory_survives_when_more_parcels_come_than_there_was_room_for(random_s
     pairs, memory = remembered(state, rng)
     stayed = np.arange(10, 30)
     larger = enlarged(pairs, 200)
-    new = find_pairs(
-        state.positions[stayed], state.radii[stayed], state.asleep[stayed], larger, stayed, room_for(200)
-    )
+    new = find_pairs(state.positions[stayed], state.radii[stayed], state.asleep[stayed], larger, stayed, room_for(200))
     names = listed(new, 20)
     assert len(names) > 20
     for k, (i, j) in enumerate(names):

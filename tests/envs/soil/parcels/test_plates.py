@@ -34,9 +34,7 @@ def copy(state):
 
 def assert_same(state, twin):
     for name in ("positions", "velocities", "forces", "torques", "plate_springs", "ground_springs"):
-        np.testing.assert_allclose(
-            getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name
-        )
+        np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_array_equal(state.shell, twin.shell)
     np.testing.assert_array_equal(state.ground, twin.ground)
 
@@ -84,9 +82,7 @@ def test_depth_inside_is_the_distance_to_the_nearest_plane(point):
 @settings(max_examples=25)
 def test_the_bucket_presses_parcels_as_its_polygons_do(random_state, tool_path, laws, seed):
     rng = np.random.default_rng(seed)
-    tool = tool_path(
-        rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.2, 0.5), rng.uniform(-0.05, 0.05, 3), 0.05, steps=4
-    )
+    tool = tool_path(rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.2, 0.5), rng.uniform(-0.05, 0.05, 3), 0.05, steps=4)
     near = tool.positions[0] + np.array([0.7, 0.0, 0.3]) @ tool.rotations[0].T
     state = random_state(rng, 20, [0.7, 0.6, 0.6], centre=near)
     state.asleep[:] = rng.random(20) < 0.2
@@ -158,9 +154,7 @@ def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(make_stat
         assert np.linalg.norm(after) >= min(CLOSEST * RADIUS, float(np.linalg.norm(away))) - 1e-9
 
 
-def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_or_the_box(
-    make_state, tool_path, laws
-):
+def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_or_the_box(make_state, tool_path, laws):
     """Also of the corner that is farthest from the bucket's origin, and of the outside of a wall."""
     tool = tool_path(pitch=0.0)
     corner = np.array([1.15, HALF, 0.0])

@@ -28,9 +28,7 @@ RADIUS = 0.045
 MASS = 0.94
 STEPS = 20
 
-NO_GROUND = Site(
-    np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0
-)
+NO_GROUND = Site(np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0)
 
 
 def add(population, positions, velocities=None, masses=None):
@@ -43,17 +41,9 @@ def copy(state):
     return State(*(array.copy() for array in state))
 
 
-def test_the_radius_of_a_parcel_is_that_of_its_mass(make_population):
-    population = make_population()
-    add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]], masses=[MASS, MASS / 8.0])
-    np.testing.assert_allclose(population.state.radii, [RADIUS, RADIUS / 2.0])
-
-
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
-def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(
-    laws, make_population, seed
-):
+def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(laws, make_population, seed):
     rng = np.random.default_rng(seed)
     positions, velocities = rng.uniform(-1.0, 1.0, (30, 3)), rng.normal(0.0, 1.0, (30, 3))
     masses = rng.uniform(0.1, 2.0, 30)
@@ -106,11 +96,7 @@ def test_growing_beyond_the_first_room_changes_nothing(monkeypatch, make_populat
 def without(memory, gone):
     """Return the memory of pairs with the rows that stay after some have left."""
     rows = np.cumsum(~gone) - 1
-    return {
-        (int(rows[i]), int(rows[j])): springs
-        for (i, j), springs in memory.items()
-        if not gone[i] and not gone[j]
-    }
+    return {(int(rows[i]), int(rows[j])): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
 
 
 def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_population, no_tool, site, laws):
@@ -154,28 +140,29 @@ def ticks_until_landed(population):
     return None
 
 
-@pytest.mark.parametrize("place", [TOUCHES_GROUND, TOUCHES_BOX_FLOOR])
-def test_a_parcel_becomes_ground_when_it_has_been_slow_there_for_a_while(make_population, place):
-    population = make_population()
-    lying(population, ground=place, velocities=[0.9 * SETTLING_SPEED_M_S, 0.0, 0.0])
-    assert ticks_until_landed(population) == math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
-    assert len(population.state.masses) == 0
+WHILE = math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
+SLOW, FAST = [0.9 * SETTLING_SPEED_M_S, 0.0, 0.0], [1.1 * SETTLING_SPEED_M_S, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
-    "arrays",
+    ("arrays", "ticks"),
     [
-        {"ground": TOUCHES_GROUND, "velocities": [1.1 * SETTLING_SPEED_M_S, 0.0, 0.0]},
-        {"ground": TOUCHES_NOTHING},
-        {"ground": TOUCHES_GROUND, "load": 1},
-        {"ground": TOUCHES_GROUND, "load": 1, "asleep": 1},
-        {"ground": TOUCHES_OUTSIDE, "load": 1},
+        ({"ground": TOUCHES_GROUND, "velocities": SLOW}, WHILE),
+        ({"ground": TOUCHES_BOX_FLOOR, "velocities": SLOW}, WHILE),
+        ({"ground": TOUCHES_GROUND, "velocities": FAST}, None),
+        ({"ground": TOUCHES_NOTHING}, None),
+        ({"ground": TOUCHES_GROUND, "load": 1}, None),
+        ({"ground": TOUCHES_GROUND, "load": 1, "asleep": 1}, None),
+        ({"ground": TOUCHES_OUTSIDE, "load": 1}, None),
+        ({"ground": TOUCHES_OUTSIDE, "velocities": FAST}, 1),  # beyond the border
+        ({"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL, "velocities": FAST}, 1),  # under the bucket
     ],
 )
-def test_a_parcel_that_is_fast_or_in_the_air_or_in_the_bucket_stays_a_parcel(make_population, arrays):
+def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_population, arrays, ticks):
     population = make_population()
     lying(population, **arrays)
-    assert ticks_until_landed(population) is None
+    assert ticks_until_landed(population) == ticks
+    assert len(population.state.masses) == (ticks is None)
 
 
 def test_the_rest_must_not_be_interrupted(make_population):
@@ -187,15 +174,6 @@ def test_the_rest_must_not_be_interrupted(make_population):
         state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
         population.settle(NO_GROUND, TICK_S)
         state.velocities[0, 0] = 0.0
-
-
-@pytest.mark.parametrize(
-    "arrays", [{"ground": TOUCHES_OUTSIDE}, {"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL}]
-)
-def test_beyond_the_border_and_between_bucket_and_ground_a_parcel_goes_at_once(make_population, arrays):
-    population = make_population()
-    lying(population, velocities=[5.0, 0.0, 0.0], **arrays)
-    assert ticks_until_landed(population) == 1
 
 
 def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
@@ -217,9 +195,7 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
     np.testing.assert_allclose(population.state.masses, MASS * np.array([2.0, 5.0]))
 
 
-def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(
-    make_population, tool_path, site
-):
+def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(make_population, tool_path, site):
     """The back of a carried bucket is let down on a parcel that lies on the ground."""
     population = make_population()
     depth = float(BUCKET.profile_t[:, 1].max())

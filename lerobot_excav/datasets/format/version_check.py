@@ -10,9 +10,7 @@ from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
 
 
-def require_this_simulation(
-    spec: TaskSpec, versions: Mapping[int, int], *, source: Path, instead: str
-) -> None:
+def require_this_simulation(spec: TaskSpec, versions: Mapping[int, int], *, source: Path, instead: str) -> None:
     """Check that episodes can be replayed by this version of the simulation.
 
     Args:
