@@ -14,7 +14,7 @@ from draccus.help_formatter import SimpleHelpFormatter
 from draccus.wrappers.docstring import HelpOrder
 
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.envs.tasks.setting import check_settings
+from lerobot_excav.envs.tasks.setting import check_settings, with_default
 from lerobot_excav.errors import ConfigurationError
 
 
@@ -32,26 +32,37 @@ class Arguments:
 
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
-        if hasattr(super(), "__post_init__"):
-            super().__post_init__()  # type: ignore[misc]  # of what is mixed in
+        getattr(super(), "__post_init__", lambda: None)()
 
 
-class EnvironmentChoice(draccus.ChoiceRegistry):  # type: ignore[misc]  # untyped
+class _Environments:
     """The settings of an environment, chosen by `--env.type` among those of the registry."""
 
+    _choice_registry: ClassVar[dict[str, Any]]
+    DEFAULTS: ClassVar[dict[str, str]] = {}
+    """What is set otherwise than the settings themselves say, unless the user does."""
+
     @classmethod
-    @override
+    def default(cls) -> Any:
+        """Return the settings of the first environment."""
+        return cls.get_choice_class(cls.default_choice_name())()
+
+    @classmethod
     def get_known_choices(cls) -> dict[str, Any]:
         for name, spec in env_types().items():
             if name not in cls._choice_registry:
                 # The name stands in help and errors.
-                choice = type(f"--env.type={name}", (spec.settings, cls), {"PREFIX": "--env."})
-                choice.__doc__ = spec.settings.__doc__
+                parts = {
+                    "PREFIX": "--env.",
+                    "__doc__": spec.settings.__doc__,
+                    "__annotations__": dict.fromkeys(cls.DEFAULTS, str),
+                    **{field: with_default(spec.settings, field, value) for field, value in cls.DEFAULTS.items()},
+                }
+                choice = type(f"--env.type={name}", (spec.settings, cls), parts)
                 cls._choice_registry[name] = dataclass(kw_only=True)(choice)
         return dict(cls._choice_registry)
 
     @classmethod
-    @override
     def get_choice_class(cls, name: str) -> Any:
         known = cls.get_known_choices()
         if name not in known:
@@ -59,9 +70,18 @@ class EnvironmentChoice(draccus.ChoiceRegistry):  # type: ignore[misc]  # untype
         return known[name]
 
     @classmethod
-    @override
     def default_choice_name(cls) -> str:
         return next(iter(cls.get_known_choices()))
+
+
+class EnvironmentChoice(_Environments, draccus.ChoiceRegistry):  # type: ignore[misc]  # draccus is untyped here
+    """Any environment."""
+
+
+class EvaluationChoice(_Environments, draccus.ChoiceRegistry):  # type: ignore[misc]
+    """Any environment, on the scenes that reports are made of."""
+
+    DEFAULTS = {"scene_set": "test"}  # noqa: RUF012 - declared above
 
 
 def parse_arguments[Parsed: Arguments](
@@ -130,7 +150,7 @@ def _set_first(parsed: Arguments, words: list[str], command: str) -> None:
         raise ConfigurationError(f"one {name} is needed, not {len(words)}: {' '.join(words)}")
 
 
-class _HelpFormatter(SimpleHelpFormatter):  # type: ignore[misc]  # untyped
+class _HelpFormatter(SimpleHelpFormatter):  # type: ignore[misc]
     """LeRobot's formatter, without a default where there is none."""
 
     @override

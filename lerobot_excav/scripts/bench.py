@@ -21,7 +21,7 @@ from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSe
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.setting import declared_settings, setting, with_default
 from lerobot_excav.scripts.arguments import EnvironmentChoice
-from lerobot_excav.scripts.demos import WorkArguments, default_environment
+from lerobot_excav.scripts.demos import WorkArguments
 
 MEASURES = ("environment", "writing", "demos")
 
@@ -30,7 +30,7 @@ MEASURES = ("environment", "writing", "demos")
 class BenchArguments(WorkArguments, PlayedScenes):
     """Arguments of `lerobot-excav bench`."""
 
-    env: EnvironmentChoice = field(default_factory=default_environment)
+    env: EnvironmentChoice = field(default_factory=EnvironmentChoice.default)
     """Environment, with its settings; the excavator by default."""
 
     scenes: int = with_default(PlayedScenes, "scenes", 3)

@@ -17,7 +17,7 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.workers import MOST_WORKERS
@@ -46,16 +46,11 @@ class ResumableArguments(WorkArguments):
     resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
 
 
-def default_environment(**settings: Any) -> Any:
-    """Return the first environment, with some settings that differ from its own defaults."""
-    return EnvironmentChoice.get_choice_class(EnvironmentChoice.default_choice_name())(**settings)
-
-
 @dataclass(kw_only=True)
 class DemosArguments(ResumableArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
-    env: EnvironmentChoice = field(default_factory=default_environment)
+    env: EnvironmentChoice = field(default_factory=EnvironmentChoice.default)
     """Environment, with its settings; the excavator by default."""
     out: Path | None = setting("Folder of the dataset; must not exist", default=None)
 

@@ -17,14 +17,13 @@ Examples:
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import pandas as pd
 
 from lerobot_excav.datasets.format.version_check import episodes_by_version, require_one_version, versions_of
 from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
-from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, Composition, select, usable
-from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, SplitUnit, split
+from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
+from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
@@ -122,13 +121,12 @@ def _print_flags(arguments: IndexArguments, root: Path, index: pd.DataFrame) -> 
     require_one_version(versions_of(index), source=root)
     seed = arguments.seed or 0
     rows = usable(index, include_failures=arguments.include_failures)
-    composition = cast(Composition, arguments.select)
-    rows = select(rows, composition, episodes=arguments.episodes, scenes=arguments.scenes, seed=seed)
+    rows = select(rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=seed)
     if arguments.split is None:
         parts = Split(train=rows["episode_index"].tolist(), evaluation=[])
     else:
         fraction = DEFAULT_EVAL_FRACTION if arguments.eval_fraction is None else arguments.eval_fraction
-        parts = split(rows, cast(SplitUnit, arguments.split), eval_fraction=fraction, seed=seed)
+        parts = split(rows, arguments.split, eval_fraction=fraction, seed=seed)
     if parts.evaluation:
         from lerobot_excav.datasets.format.episode_table import require_single_task
 

@@ -6,7 +6,7 @@
 Examples:
   lerobot-excav operator --env.type=excavator --scenes=100 --metrics=outputs/operator.jsonl
       100 test scenes with 4 targets each
-  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/op.jsonl
+  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/o.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
   lerobot-excav operator --env.type=fr5_grasp --env.retarget_frame=100 --scenes=100 --metrics=outputs/fr5_operator.jsonl
       the arm's operator, whose command changes after 2 s
@@ -14,27 +14,23 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
-from lerobot_excav.scripts.arguments import EnvironmentChoice
-from lerobot_excav.scripts.demos import ResumableArguments, default_environment, played
+from lerobot_excav.scripts.arguments import EvaluationChoice
+from lerobot_excav.scripts.demos import ResumableArguments, played
 
 MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay")
-
-
-def _test_scenes() -> Any:
-    return default_environment(scene_set="test")
 
 
 @dataclass(kw_only=True)
 class OperatorArguments(ResumableArguments, PlayedScenes):
     """Arguments of `lerobot-excav operator`."""
 
-    env: EnvironmentChoice = field(default_factory=_test_scenes)
-    """Environment, with its settings; the excavator's test scenes by default."""
+    env: EvaluationChoice = field(default_factory=EvaluationChoice.default)
+    """Environment, with its settings; the excavator by default, and test scenes unless others are asked for."""
 
     metrics: Path | None = setting("Metrics file to write; must not exist", default=None)
 

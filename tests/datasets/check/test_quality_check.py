@@ -17,7 +17,7 @@ from ..toy import MAIN, MASK, STATE, load, record_toy
 
 @pytest.fixture
 def tampered(paired_dataset, tmp_path):
-    """Copy the dataset with a column changed: `change(values, rows)` edits a list; `rows[e]` are those of an episode."""
+    """Copy the dataset with a column changed: `change(values, rows)` edits a list; `rows[e]` are of an episode."""
 
     def tamper(key, change):
         root = tmp_path / "tampered"

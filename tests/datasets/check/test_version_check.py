@@ -7,7 +7,7 @@ from lerobot.datasets import delete_episodes, merge_datasets, split_dataset
 from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
-from lerobot_excav.datasets.check.version_check import require_one_version, versions_of
+from lerobot_excav.datasets.format.version_check import require_one_version, versions_of
 from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
 from lerobot_excav.envs.tasks.registry import TASKS
 from lerobot_excav.errors import DatasetError
