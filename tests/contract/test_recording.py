@@ -9,7 +9,7 @@ import pytest
 
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
-MakeRobot = Callable[..., SimulatedRobot[Any]]
+MakeRobot = Callable[..., SimulatedRobot]
 Action = dict[str, float]
 RecordEpisode = Callable[..., tuple[int, ...]]
 
@@ -27,19 +27,19 @@ def announcements_are_heard() -> Iterator[None]:
 def record_episode(still: Action) -> RecordEpisode:
     """Play LeRobot's part of an episode; return its scene, target and steps before its first frame."""
 
-    def _record(robot: SimulatedRobot[Any], index: int, *, frames: int = 2) -> tuple[int, ...]:
+    def _record(robot: SimulatedRobot, index: int, *, frames: int = 2) -> tuple[int, ...]:
         logging.info(f"Recording episode {index}")
         first = robot.get_observation()
         for _ in range(frames):
             robot.send_action(still)
         logging.info("Reset the environment")
         robot.send_action(still)
-        return tuple(int(first[name]) for name in robot.state_names[:3])
+        return tuple(int(first[name]) for name in robot.task_spec.state_names[:3])
 
     return _record
 
 
-def lines_of(robot: SimulatedRobot[Any]) -> list[dict[str, Any]]:
+def lines_of(robot: SimulatedRobot) -> list[dict[str, Any]]:
     path = robot.config.session_log
     assert path is not None
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
@@ -87,22 +87,18 @@ def test_the_session_log_describes_each_episode(make_robot: MakeRobot, record_ep
     record_episode(robot, 0, frames=4)
     assert lines_of(robot) == []
     robot.disconnect()
-    assert lines_of(robot) == [
-        {
-            "episode_index": 0,
-            "simulation_version": robot.simulation_version,
-            "scene_set": "val",
-            "scene_id": 3,
-            "target_id": 0,
-            "fps": 25,
-            "observation_height": 96,
-            "observation_width": 160,
-            "task": robot.config.task,
-            **robot.describe_simulation(),
-            "frames": 4,
-            "restarts": [],
-        }
-    ]
+    expected = {
+        "episode_index": 0,
+        "simulation_version": robot.task_spec.simulation_version,
+        "env": robot.task_spec.env_type,
+        "settings": robot.settings.as_dict(),
+        "scene_id": 3,
+        "commands": [[0, 0]],
+        "frames": 4,
+        "restarts": [],
+    }
+    assert lines_of(robot) == [expected]
+    assert expected["settings"].items() >= {"scene_set": "val", "fps": 25, "observation_width": 160}.items()
 
 
 def test_restarts_within_an_episode_are_noted(make_robot: MakeRobot, still: Action) -> None:
@@ -123,7 +119,7 @@ def test_a_robot_driven_home_between_episodes_starts_the_next_one_afresh(
     record_episode(robot, 0)
     observation = robot.get_observation()
     for _ in range(3):
-        robot.send_action({name: observation[name] for name in robot.state_names if name.endswith(".pos")})
+        robot.send_action({name: observation[name] for name in robot.task_spec.state_names if name.endswith(".pos")})
     assert record_episode(robot, 1) == (0, 1, 0)
     logging.info("Stop recording")
     assert [(line["frames"], line["restarts"]) for line in lines_of(robot)] == [(2, []), (2, [])]

@@ -12,7 +12,7 @@ SHORT = ("--scenes=1", "--targets=1", "--env.episode_length=4", "--workers=0")
     [
         (
             ["--env.type=fr5_grasp", "--env.retarget_frame=2"],
-            {"task": "FR5Grasp-v0", "scene_set": "test", "commands": [[0, 0], [2, 2]]},
+            {"task": "FR5Grasp-v0", "scene_set": "test", "commands": [[0, 0], [2, 3]]},
             "target selection [%]",
         ),
         (

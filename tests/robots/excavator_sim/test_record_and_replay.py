@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.scripts import lerobot_record, lerobot_replay
-from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 
 from lerobot_excav.datasets.format.schema import dataset_features, excav_features
 from lerobot_excav.envs.machines.excavator.features import STATE_NAMES
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 
 pytestmark = pytest.mark.slow
@@ -75,16 +75,16 @@ def image_of(row: dict[str, Any], camera: str) -> Any:
 def test_a_recording_is_reproduced_bit_for_bit_from_its_session_log(record: Run, tmp_path: Path) -> None:
     record("--dataset.num_episodes=2", "--robot.scene_id=3", "--robot.target_id=3", "--robot.scene_set=val")
     dataset, session = dataset_of(tmp_path), session_of(tmp_path)
-    assert [(each["episode_index"], each["scene_id"], each["target_id"]) for each in session] == [
-        (0, 3, 3),
-        (1, 4, 0),
+    assert [(each["episode_index"], each["scene_id"], each["commands"]) for each in session] == [
+        (0, 3, [[0, 3]]),
+        (1, 4, [[0, 0]]),
     ]
     env = ExcavatorEnv(scene_set="val", **SIZE)
     for episode in session:
         rows = rows_of(dataset, episode["episode_index"])
         assert len(rows) == episode["frames"] > 3
         assert any(row["action"].abs().max() > 0.1 for row in rows)
-        observation, _ = env.reset(options={key: episode[key] for key in ("scene_id", "target_id")})
+        observation, _ = env.reset(options={"scene_id": episode["scene_id"], "target_id": episode["commands"][0][1]})
         for row in rows:
             assert np.array_equal(row["observation.state"].numpy(), observation["agent_pos"])
             for camera in CAMERAS:
@@ -96,8 +96,8 @@ def test_a_recording_is_reproduced_bit_for_bit_from_its_session_log(record: Run,
 def test_a_recording_has_the_schema_of_scripted_data(record: Run, tmp_path: Path) -> None:
     record("--dataset.num_episodes=1")
     dataset = dataset_of(tmp_path)
-    expected = dataset_features(EXCAVATOR, height=48, width=64)
-    for key in expected.keys() - excav_features(EXCAVATOR).keys():
+    expected = dataset_features(SCOOP, height=48, width=64)
+    for key in expected.keys() - excav_features(SCOOP).keys():
         recorded = dataset.features[key]
         assert recorded["dtype"] == expected[key]["dtype"], key
         assert tuple(recorded["shape"]) == tuple(expected[key]["shape"]), key
@@ -115,7 +115,7 @@ def test_an_episode_recorded_again_starts_over(record: Run, tmp_path: Path, monk
     monkeypatch.setattr(lerobot_record, "init_keyboard_listener", lambda: (None, keys))
     record("--dataset.num_episodes=1", "--robot.target_id=2")
     dataset, (episode,) = dataset_of(tmp_path), session_of(tmp_path)
-    assert (episode["episode_index"], episode["scene_id"], episode["target_id"]) == (0, 0, 2)
+    assert (episode["episode_index"], episode["scene_id"], episode["commands"]) == (0, 0, [[0, 2]])
     assert len(dataset) == episode["frames"]
     env = ExcavatorEnv(obs_type="agent_pos")
     start, _ = env.reset(options={"scene_id": 0, "target_id": 2})
