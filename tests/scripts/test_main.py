@@ -22,16 +22,6 @@ def test_the_version_is_told(capsys):
     assert capsys.readouterr().out == f"lerobot-excav {version('lerobot_env_excav')}\n"
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_help_of_a_command_has_examples_that_name_it(command, capsys):
-    with pytest.raises(SystemExit) as exit_info:
-        main([command, "--help"])
-    assert exit_info.value.code == 0
-    text = capsys.readouterr().out
-    assert "Examples:" in text
-    assert f"lerobot-excav {command}" in text.partition("Examples:")[2]
-
-
 def test_help_loads_nothing_heavy():
     code = (
         "import sys; from lerobot_excav.scripts.main import main\n"

@@ -7,8 +7,8 @@ from lerobot.datasets import delete_episodes, merge_datasets, split_dataset
 from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
-from lerobot_excav.datasets.format.version_check import require_one_version, versions_of
-from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
+from lerobot_excav.datasets.format.version_check import versions_of
+from lerobot_excav.datasets.pairs.paired_index import write_index
 from lerobot_excav.envs.tasks.registry import TASKS
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.scripts.main import main
@@ -33,11 +33,6 @@ def test_every_version_says_what_it_changed(spec):
     assert sorted(spec.changes) == list(range(1, spec.simulation_version + 1))
 
 
-def test_every_frame_names_the_version_that_made_it(paired_dataset):
-    assert {int(version) for version in load(paired_dataset).hf_dataset["excav.simulation_version"]} == {1}
-    assert set(build_index(paired_dataset)["simulation_version"]) == {1}
-
-
 def test_the_version_survives_deleting_splitting_and_merging(mixed_dataset, tmp_path):
     expected = {i: 1 + (i >= 19) for i in range(23)}
     assert versions_of(write_index(mixed_dataset)) == expected
@@ -47,7 +42,10 @@ def test_the_version_survives_deleting_splitting_and_merging(mixed_dataset, tmp_
     assert versions_of(write_index(part.root)) == {0: 1, 1: 2}
 
 
-def test_an_older_dataset_is_checked_but_not_replayed(mixed_dataset, monkeypatch):
+def test_what_another_version_recorded_is_checked_but_not_replayed(mixed_dataset, monkeypatch):
+    with pytest.raises(DatasetError, match=r"episodes 19, 20, 21 and 1 more of version 2 .* this older package"):
+        check_dataset(mixed_dataset, replays=1)
+    assert set(check_dataset(mixed_dataset, episodes=range(19), replays=2)["qc"]) == {"passed"}
     monkeypatch.setitem(TASKS, REACH.id, LATER)
     assert set(check_dataset(mixed_dataset, replays=0)["qc"]) == {"passed"}
     with pytest.raises(DatasetError) as caught:
@@ -61,12 +59,6 @@ def test_an_older_dataset_is_checked_but_not_replayed(mixed_dataset, monkeypatch
         assert part in str(caught.value)
 
 
-def test_a_newer_dataset_is_not_replayed_but_for_what_this_version_recorded(mixed_dataset):
-    with pytest.raises(DatasetError, match=r"episodes 19, 20, 21 and 1 more of version 2 .* this older package"):
-        check_dataset(mixed_dataset, replays=1)
-    assert set(check_dataset(mixed_dataset, episodes=range(19), replays=2)["qc"]) == {"passed"}
-
-
 def test_the_index_command_tells_a_mixture_and_chooses_nothing_of_it(mixed_dataset, capsys):
     assert main(["index", str(mixed_dataset)]) == 0
     text = capsys.readouterr().out
@@ -74,9 +66,3 @@ def test_the_index_command_tells_a_mixture_and_chooses_nothing_of_it(mixed_datas
     assert "mixed: a scene's number means another scene in each version" in text
     assert main(["index", str(mixed_dataset), "--select=paired", "--flags"]) == 2
     assert "mixes versions of the simulation" in capsys.readouterr().err
-
-
-def test_episodes_of_one_version_are_not_mixed(tmp_path):
-    require_one_version({0: 1, 1: 1}, source=tmp_path)
-    with pytest.raises(DatasetError, match=r"version 1: episodes 0; version 2: episodes 1\)"):
-        require_one_version({0: 1, 1: 2}, source=tmp_path)

@@ -78,20 +78,6 @@ def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
     assert len(small) == 4 * few
 
 
-def test_the_seed_changes_the_choice():
-    index = index_of([(s, t) for s in range(12) for t in range(4)])
-    choices = {tuple(select(index, "paired", scenes=3, seed=seed)["scene_id"]) for seed in range(8)}
-    assert len(choices) > 1
-
-
-def test_failures_rejected_episodes_and_repetitions_are_not_usable():
-    index = index_of([(0, 0), (0, 1), (0, 2), (0, 2)])
-    index.loc[0, "success"] = False
-    index.loc[1, "qc"] = "failed"
-    assert usable(index)["episode_index"].tolist() == [2]
-    assert usable(index, include_failures=True)["episode_index"].tolist() == [0, 2]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -109,47 +95,39 @@ def test_contradictory_arguments_are_named(arguments, message):
         select(index, **arguments)
 
 
-def test_an_empty_index_is_refused():
+def test_the_seed_changes_the_choice():
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    assert len({tuple(select(index, "paired", scenes=3, seed=seed)["scene_id"]) for seed in range(8)}) > 1
+
+
+def test_failures_rejected_episodes_and_repetitions_are_not_usable():
+    index = index_of([(0, 0), (0, 1), (0, 2), (0, 2)])
+    index.loc[0, "success"] = False
+    index.loc[1, "qc"] = "failed"
+    assert usable(index)["episode_index"].tolist() == [2]
+    assert usable(index, include_failures=True)["episode_index"].tolist() == [0, 2]
     with pytest.raises(DatasetError, match="no usable episode"):
-        select(usable(index_of([(0, 0)], success=False)), "all")
+        select(usable(index.assign(success=False)), "all")
 
 
-def two_soils(pairs: list[tuple[int, int]]) -> pd.DataFrame:
-    both = [index_of(pairs), index_of(pairs, soil="gravel")]
-    index = pd.concat(both, ignore_index=True)
-    return index.assign(episode_index=range(len(index)))
-
-
-def test_a_pair_on_another_soil_is_no_duplicate():
-    assert len(usable(two_soils([(0, 0), (0, 1)]))) == 4
-
-
-def test_a_scene_on_another_soil_counts_as_another_scene():
-    index = two_soils([(0, 0), (0, 1)])
-    index = index[index["episode_index"] != 1]  # sand lacks target 1
-    assert set(select(index, "paired")["soil"]) == {"gravel"}
-    assert len(select(index, "non-paired")) == 2
-
-
-def test_a_split_by_scene_holds_a_scene_out_on_all_soils():
-    index = two_soils([(scene, 0) for scene in range(5)])
+def test_a_scene_on_another_soil_is_another_start_but_held_out_with_it():
+    pairs = [(scene, target) for scene in range(5) for target in range(2)]
+    index = pd.concat([index_of(pairs), index_of(pairs, soil="gravel")], ignore_index=True)
+    index = index.assign(episode_index=range(20))
+    assert len(usable(index)) == 20
     parts = split(index, "scene", eval_fraction=0.2)
     held_out = index[index["episode_index"].isin(parts.evaluation)]
-    assert sorted(held_out["soil"]) == ["gravel", "sand"]
+    assert sorted(held_out["soil"]) == ["gravel"] * 2 + ["sand"] * 2
     assert held_out["scene_id"].nunique() == 1
-
-
-def test_coverage_names_the_soil_where_there_are_several():
-    index = two_soils([(0, 0), (0, 1)])
-    coverage = pair_coverage(index[index["episode_index"] != 1])
-    assert coverage.scenes == 2
+    index = index[index["episode_index"] != 1]  # scene 0 on sand lacks target 1
+    assert len(select(index, "paired")) == 18
+    assert len(select(index, "non-paired")) == 10
+    coverage = pair_coverage(index)
+    assert (coverage.scenes, coverage.duplicates) == (10, {})
     assert coverage.missing == {"excavator/train/0 on sand": [1]}
-    assert coverage.duplicates == {}
 
 
 def test_where_no_setting_changes_the_start_scenes_are_paired_by_number_alone():
-    index = index_of([(s, t) for s in range(3) for t in range(2)], env="fr5_grasp").drop(columns="soil")
-    twice = pd.concat([index, index.iloc[[1]].assign(episode_index=6)], ignore_index=True)
-    assert len(usable(twice)) == 6
-    assert select(usable(twice), "paired", scenes=2)["scene_id"].nunique() == 2
-    assert pair_coverage(twice).duplicates == {"excavator/train/0/1": [1, 6]}
+    index = index_of([(0, 0), (0, 1), (1, 0), (1, 1), (0, 1)], env="fr5_grasp").drop(columns="soil")
+    assert len(select(usable(index), "paired")) == 4
+    assert pair_coverage(index).duplicates == {"excavator/train/0/1": [1, 4]}

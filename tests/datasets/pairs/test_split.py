@@ -66,20 +66,18 @@ def test_stock_lerobot_train_splits_as_the_flags_say(paired_dataset, unit, fract
     assert lerobot_split(paired_dataset, parts.flags()) == (parts.train, parts.evaluation)
 
 
-def test_the_seed_changes_the_split():
-    index = index_of([(s, t) for s in range(12) for t in range(4)])
-    assert len({tuple(split(index, "scene", seed=seed).evaluation) for seed in range(6)}) > 1
-
-
-def test_splitting_by_scene_and_by_episode_differ():
-    index = index_of([(s, t) for s in range(12) for t in range(4)])
-    assert len(split(index, "scene", eval_fraction=0.25).evaluation) == 12
-    by_episode = split(index, "episode", eval_fraction=0.25).evaluation
-    assert len(by_episode) == 12
-    assert len({number // 4 for number in by_episode}) > 3
-
-
 @pytest.mark.parametrize("fraction", [-0.1, 1.0])
 def test_a_fraction_out_of_range_is_named(fraction):
     with pytest.raises(ConfigurationError, match="--eval_fraction="):
         split(index_of([(0, 0), (1, 0)]), "scene", eval_fraction=fraction)
+
+
+def test_units_and_seeds_hold_out_other_episodes():
+    index = index_of([(s, t) for s in range(12) for t in range(4)])
+    by_scene, by_episode, other_seed = (
+        split(index, unit, eval_fraction=0.25, seed=seed).evaluation
+        for unit, seed in (("scene", 0), ("episode", 0), ("scene", 1))
+    )
+    assert len(by_scene) == len(by_episode) == 12
+    assert len({number // 4 for number in by_scene}) == 3 < len({number // 4 for number in by_episode})
+    assert by_scene != other_seed
