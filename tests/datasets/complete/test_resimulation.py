@@ -10,11 +10,12 @@ from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.complete import resimulation
 from lerobot_excav.datasets.complete.resimulation import complete_recording
+from lerobot_excav.datasets.complete.session import read_session
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
 from lerobot_excav.datasets.format.schema import PAIR_KEY, SCENE_KEY, TARGET_KEY, excav_features
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
-from lerobot_excav.errors import DatasetError, ExcavError
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.robots.session_log import SessionLog
 
 from ..toy import load, record_toy, toy_settings
@@ -50,10 +51,12 @@ def session(recorded, tmp_path):
     """Write the session with some lines changed: `{episode_index: changes}`; settings are changed one by one."""
     lines = [json.loads(line) for line in recorded[1].read_text().splitlines()]
 
-    def write(changes=None, *, before=()):
+    def write(changes=None, *, first=None):
+        before = [] if first is None else [{**lines[0], **first}]
         changed = [*before, *({**line, **(changes or {}).get(line["episode_index"], {})} for line in lines)]
         for line in changed:
-            line["settings"] = {**lines[0]["settings"], **line["settings"]}
+            if line["env"] == "toy_reach":
+                line["settings"] = {**lines[0]["settings"], **line["settings"]}
         path = tmp_path / "session.jsonl"
         path.write_text("".join(json.dumps(line) + "\n" for line in changed))
         return path
@@ -90,18 +93,15 @@ def test_a_recording_of_corrupted_masks_is_completed(tmp_path):
     pd.testing.assert_frame_equal(build_index(recording), build_index(tmp_path / "original"))
 
 
-def test_completing_in_place_replaces_the_recording(recording, recorded, tmp_path):
+def test_completing_in_place_replaces_the_recording_and_the_later_of_two_lines_counts(recording, session, tmp_path):
     root = tmp_path / "recording"
     shutil.copytree(recording, root)
-    assert complete_recording(root, recorded[1]) == root
-    assert len(build_index(root)) == 19
-    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
-
-
-def test_the_later_of_two_lines_about_an_episode_counts(recording, recorded, session, tmp_path):
-    first = json.loads(recorded[1].read_text().splitlines()[0])
-    complete_recording(recording, session(before=[{**first, "scene_id": 4}]), out=tmp_path / "c")
-    assert build_index(tmp_path / "c")["scene_id"][0] == 0
+    path = session(first={"scene_id": 4})
+    assert complete_recording(root, path) == root
+    assert build_index(root)["scene_id"].tolist()[:4] == [0] * 4
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording", "session.jsonl"]
+    with pytest.raises(DatasetError, match="already"):
+        complete_recording(root, path)
 
 
 def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
@@ -125,6 +125,7 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
         ({"simulation_version": 7}, r"episodes 1 of version 7 of the simulation cannot be replayed"),
         ({"restarts": [3]}, r"restarted within episode 1 at frame \[3\], .* --skip_restarted"),
         ({"episode_index": 99}, r"no line for episodes \[1\]"),
+        ({"env": "fr5_grasp", "settings": {}}, "episode 1: the session is of fr5_grasp, the recording of toy_reach"),
     ],
 )
 def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, changes, message):
@@ -152,26 +153,16 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
         ({"settings": {"colour": 1}}, "colour is not a setting of toy_reach; allowed: task"),
     ],
 )
-def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed(
-    recording, session, tmp_path, changes, message
-):
-    with pytest.raises(ExcavError, match=rf"session\.jsonl:2: {message}"):
-        complete_recording(recording, session({1: changes}), out=tmp_path / "c")
+def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed(session, changes, message):
+    with pytest.raises(DatasetError, match=rf"session\.jsonl:2: {message}"):
+        read_session(session({1: changes}))
 
 
 @pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks simulation_v")])
-def test_a_damaged_session_names_the_line(recording, tmp_path, text, message):
+def test_a_damaged_session_names_the_line(tmp_path, text, message):
     (tmp_path / "s.jsonl").write_text(text)
     with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
-        complete_recording(recording, tmp_path / "s.jsonl", out=tmp_path / "c")
-
-
-def test_a_session_of_another_environment_is_refused(recording, recorded, tmp_path):
-    lines = [json.loads(line) for line in recorded[1].read_text().splitlines()]
-    lines[1] |= {"env": "fr5_grasp", "settings": {}}
-    (tmp_path / "s.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-    with pytest.raises(DatasetError, match="episode 1: the session is of fr5_grasp, the recording of toy_reach"):
-        complete_recording(recording, tmp_path / "s.jsonl", out=tmp_path / "c")
+        read_session(tmp_path / "s.jsonl")
 
 
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):
@@ -181,12 +172,9 @@ def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, s
     expected["episode_index"] = range(17)
     pd.testing.assert_frame_equal(build_index(out), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "session.jsonl"]
-
-
-def test_a_recording_of_restarted_episodes_alone_is_refused(recording, session, tmp_path):
     path = session({index: {"restarts": [1]} for index in range(19)})
     with pytest.raises(DatasetError, match="if others remain"):
-        complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True)
+        complete_recording(recording, path, out=tmp_path / "d", skip_restarted=True)
 
 
 def test_a_recording_edited_before_indexing_is_refused(recording, recorded, tmp_path):
@@ -216,8 +204,3 @@ def test_a_failed_exchange_puts_the_recording_back(tmp_path):
     with pytest.raises(FileNotFoundError):
         resimulation._put_in_place(tmp_path / "absent", tmp_path / "recording", None)
     assert [path.name for path in tmp_path.iterdir()] == ["recording"]
-
-
-def test_a_dataset_with_the_columns_is_not_completed_again(paired_dataset, session, tmp_path):
-    with pytest.raises(DatasetError, match="already"):
-        complete_recording(paired_dataset, session(), out=tmp_path / "c")
