@@ -7,7 +7,6 @@ UV := $(VENV)/bin/uv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 DEMO := outputs/demo
-STEPS ?= 200000
 JOBS ?= 1
 
 # No GPU and no display are needed: pictures come from EGL. LeRobot asks no hub for anything.
@@ -44,14 +43,15 @@ demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a vi
 demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leaves a video and a table (< 3 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo_fr5.sh outputs/demo_fr5
 
-table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; goes on where it stopped; JOBS=2)
-	@$(RUN)/lerobot-excav experiment experiments/fr5_grasp/stages.toml --jobs=$(JOBS)
+table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; JOBS=2; run again to continue)
+	@test -x $(RUN)/snakemake || UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact --extra workflows
+	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/fr5_grasp/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
 	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal
 
-fuzz: $(READY) ## 200,000 steps of random actions, the soil checked after each (STEPS=… for fewer; takes about an hour)
-	@OMP_NUM_THREADS=1 $(RUN)/lerobot-excav bench fuzz --steps=$(STEPS)
+fuzz: $(READY) ## random commands to machine and soil, checked after every step (about an hour)
+	@OMP_NUM_THREADS=1 $(RUN)/pytest tests/fuzz --hypothesis-profile=fuzz
 
 lint: $(READY) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .

@@ -39,9 +39,7 @@ def make_env(
         ConfigurationError: No environment of this package has the task.
     """
     config = config_for(cfg.task if cfg is not None else None)
-    envs: dict[str, dict[int, gym.vector.VectorEnv[Any, Any, Any]]] = config.create_envs(
-        n_envs, use_async_envs
-    )
+    envs: dict[str, dict[int, gym.vector.VectorEnv[Any, Any, Any]]] = config.create_envs(n_envs, use_async_envs)
     return envs
 
 

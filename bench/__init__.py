@@ -1,1 +1,1 @@
-"""Measurements of this machine and of the code; each module is run by `python -m bench.NAME`."""
+"""Speed of this machine, films, and checks of the simulation against itself; not part of the wheel."""

@@ -6,22 +6,22 @@ A change that should not change the simulation is checked with it:
     python bench/compare_traces.py record after.npz       # on the code after it
     python bench/compare_traces.py before.npz after.npz   # exit code 1 if anything differs
 
-A record holds, for every case below and every frame: the action (of the scripted operator, or drawn from a seed), a digest
-of every picture, `agent_pos`, reward, flags, success, task state and command; and the metrics at the end.
+A record holds, for every case below and every frame: the action (of the scripted operator, or drawn from a seed), a
+digest of every picture, `agent_pos`, reward, flags, success, task state and command; and the metrics at the end.
 """
 
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from lerobot_excav.envs.tasks.registry import task_spec
 
 import lerobot_excav.envs  # noqa: F401 - registers the environments
+from lerobot_excav.envs.tasks.registry import task_spec
 
 SCOOP, GRASP = "Scoop-v0", "FR5Grasp-v0"
 
@@ -80,12 +80,12 @@ def record(path: Path) -> None:
     for name, task, actor, frames, scene_id, target_id, settings in CASES:
         env = gym.make(f"lerobot_excav/{task}", disable_env_checker=True, **settings).unwrapped
         observation, info = env.reset(seed=3, options={"scene_id": scene_id, "target_id": target_id})
-        rows = [_row(observation, info, 0.0, False, False)]
+        rows = [_row(observation, info, 0.0, (False, False))]
         actions, metrics = [], {}
         for action in _actions(actor, task, env, frames):
             observation, reward, terminated, truncated, info = env.step(action)
             actions.append(action)
-            rows.append(_row(observation, info, reward, terminated, truncated))
+            rows.append(_row(observation, info, reward, (terminated, truncated)))
             metrics = info.get("episode_metrics", {})
             if terminated or truncated:
                 break
@@ -114,13 +114,11 @@ def _actions(actor: str, task: str, env: Any, frames: int) -> Iterator[Any]:
         yield (middle + half * wish).astype(np.float32)
 
 
-def _row(observation: dict[str, Any], info: dict[str, Any], reward: float, *flags: bool) -> dict[str, Any]:
+def _row(observation: dict[str, Any], info: dict[str, Any], reward: float, flags: tuple[bool, bool]) -> dict[str, Any]:
     pixels = observation.get("pixels", {})
     return {
         "agent_pos": observation["agent_pos"],
-        "pixels": " ".join(
-            f"{k}:{hashlib.sha256(v.tobytes()).hexdigest()[:16]}" for k, v in sorted(pixels.items())
-        ),
+        "pixels": " ".join(f"{k}:{hashlib.sha256(v.tobytes()).hexdigest()[:16]}" for k, v in sorted(pixels.items())),
         "reward": float(reward),
         "flags": [*flags, bool(info["is_success"])],
         "task_state": info["task_state"],
@@ -137,9 +135,7 @@ def compare(first: Path, second: Path) -> list[str]:
     a, b = np.load(first), np.load(second)
     problems = [f"{key}: only in one record" for key in sorted(set(a.files) ^ set(b.files))]
     for key in sorted(set(a.files) & set(b.files)):
-        problems += (
-            _metric_differences(key, a, b) if key.endswith("/metrics") else _differences(key, a[key], b[key])
-        )
+        problems += _metric_differences(key, a, b) if key.endswith("/metrics") else _differences(key, a[key], b[key])
     return problems
 
 

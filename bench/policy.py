@@ -93,9 +93,7 @@ def take_turns(tasks: dict[str, Task], rounds: int) -> dict[str, float]:
     return {name: statistics.median(times) for name, times in durations.items()}
 
 
-def measure(
-    *, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100
-) -> None:
+def measure(*, rounds: int, batch_size: int = 32, height: int = 96, width: int = 128, chunk_size: int = 100) -> None:
     """Print the speeds of all policies, one number a line."""
     configs = policy_configs(height=height, width=width, chunk_size=chunk_size)
     policies = {name: get_policy_class(config.type)(config) for name, config in configs.items()}
@@ -103,8 +101,8 @@ def measure(
     training = take_turns({name: training_step(policy, batch) for name, policy in policies.items()}, rounds)
     plans = take_turns({name: planning(policy) for name, policy in policies.items()}, rounds)
     for name in policies:
-        print(f"{'training ' + name:42} {batch_size / training[name]:10.2f} samples/s")  # noqa: T201
-        print(f"{'planning ' + name:42} {1e3 * plans[name]:10.2f} ms per chunk")  # noqa: T201
+        print(f"{'training ' + name:42} {batch_size / training[name]:10.2f} samples/s")
+        print(f"{'planning ' + name:42} {1e3 * plans[name]:10.2f} ms per chunk")
 
 
 if __name__ == "__main__":

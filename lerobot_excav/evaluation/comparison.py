@@ -74,9 +74,7 @@ def matched(run: Run, reference: Run, measure: str) -> NDArray[Any]:
 def require_same_task(first: Run, second: Run) -> None:
     """Raise `DatasetError` unless two runs are of one task."""
     if first.task != second.task:
-        raise DatasetError(
-            f"{first.label} is of {first.task} and {second.label} of {second.task}; report them apart"
-        )
+        raise DatasetError(f"{first.label} is of {first.task} and {second.label} of {second.task}; report them apart")
 
 
 def difference_of_worlds(first: Run, second: Run) -> str:

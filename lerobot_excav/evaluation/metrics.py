@@ -82,9 +82,7 @@ def _lines(path: Path) -> list[_Line]:
     try:
         texts = path.read_text().splitlines()
     except FileNotFoundError:
-        raise DatasetError(
-            f"{path} does not exist; lerobot-eval writes it with --env.metrics_path={path}"
-        ) from None
+        raise DatasetError(f"{path} does not exist; lerobot-eval writes it with --env.metrics_path={path}") from None
     places = [(f"{path}:{number}", text) for number, text in enumerate(texts, 1) if text.strip()]
     if not places:
         raise DatasetError(f"{path} is empty: no episode was finished")
@@ -115,8 +113,6 @@ def _by_key(lines: list[_Line], measures: TaskMeasures) -> dict[EpisodeKey, Epis
     for line in lines:
         episode = validated(measures.record, line.text, line.place)
         if episode.key in episodes:
-            raise DatasetError(
-                f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?"
-            )
+            raise DatasetError(f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?")
         episodes[episode.key] = episode
     return episodes

@@ -42,9 +42,7 @@ def evaluate_operator(
         raise DatasetError(f"--metrics={path} exists; choose another file, or remove it first")
     partial = path.with_name(f"{path.name}.partial")
     if partial.exists() and not resume:
-        raise DatasetError(
-            f"{partial} is an interrupted run; continue it with --resume=true, or remove the file"
-        )
+        raise DatasetError(f"{partial} is an interrupted run; continue it with --resume=true, or remove the file")
     path.parent.mkdir(parents=True, exist_ok=True)
     pairs = settings.pairs()
     lines = _finished_lines(partial, settings, pairs)

@@ -1,7 +1,7 @@
 """Where an evaluation comes from: its command, its code, and the training of its policy.
 
-`X.json` beside `X.jsonl` says so; what writes metrics writes it (`envs.configs.provenance`). Copies on a result page hold
-the training as well. Otherwise it is read where the command found the policy.
+`X.json` beside `X.jsonl` says so, written by `envs.configs.provenance`. Copies on a result page hold the training as
+well. Otherwise it is read where the command found the policy.
 """
 
 from pathlib import Path

@@ -5,18 +5,19 @@ from collections.abc import Sequence
 from lerobot_excav.envs.tasks.measures import Kind
 from lerobot_excav.evaluation.markdown import difference_cells, render, value_text
 from lerobot_excav.evaluation.report import Report
+from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary
 
 
 def report_text(report: Report) -> str:
     """Write a report as Markdown."""
-    measures = report.runs[0].measures
+    measures = report.runs[0].run.measures
     ratios = [column.header for column in measures.columns if column.kind is Kind.RATIO]
     return render(
         "report",
         seed=report.bootstrap_seed,
         header=["run", *measures.setting, "n", "seeds", *(column.header for column in measures.columns)],
-        rows=[_row(run) for run in report.runs],
+        rows=[_row(row) for row in report.runs],
         differences={
             name: [
                 [column.header, *difference_cells(column, difference)]
@@ -25,14 +26,14 @@ def report_text(report: Report) -> str:
             ]
             for name, differences in report.differences.items()
         },
-        simulations=simulations(report.runs),
+        simulations=simulations([row.run for row in report.runs]),
         measures=measures.legend(report.operator),
         lacks_operator=ratios if report.operator is None else [],
         notes=report.notes,
     )
 
 
-def simulations(runs: Sequence[RunSummary]) -> str:
+def simulations(runs: Sequence[Run]) -> str:
     """Describe the simulation, run by run if they differ."""
     by_run = {run.label: run.measures.simulation.format(**run.constants) for run in runs}
     if len(set(by_run.values())) == 1:
@@ -40,6 +41,7 @@ def simulations(runs: Sequence[RunSummary]) -> str:
     return "; ".join(f"{label}: {text}" for label, text in by_run.items())
 
 
-def _row(run: RunSummary) -> list[str]:
-    values = (value_text(column, run.values[column.key]) for column in run.measures.columns)
-    return [run.label, *run.setting.values(), str(run.episodes), str(run.seeds), *values]
+def _row(row: RunSummary) -> list[str]:
+    values = (value_text(column, row[column.key]) for column in row.run.measures.columns)
+    counts = (str(row.counts[name]) for name in ("episodes", "seeds"))
+    return [row.run.label, *row.run.setting.values(), *counts, *values]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
+from lerobot_excav.envs.tasks.measures import Column, Kind
 from lerobot_excav.evaluation.comparison import matched, means_by_key
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
@@ -32,38 +32,28 @@ class RunSummary:
     """One row of a report.
 
     Attributes:
-        label: Name of the run.
-        task: Its task.
-        measures: What is measured of the task.
-        episodes: Number of episodes, over all seeds.
-        seeds: Number of evaluations, one per training seed.
-        scenes: Number of scenes and targets.
-        constants: What all episodes share.
-        setting: What tells the run apart, by header.
-        values: The measures, by the key of their column.
+        run: The run.
+        values: Its measures, by the key of their column.
     """
 
-    label: str
-    task: str
-    measures: TaskMeasures
-    episodes: int
-    seeds: int
-    scenes: int
-    constants: dict[str, Any]
-    setting: dict[str, str]
+    run: Run
     values: dict[str, Value]
 
     def __getitem__(self, key: str) -> Any:
         """Return a measure by the key of its column."""
         return self.values[key]
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Episodes, training seeds, and scenes with their target."""
+        run = self.run
+        return {"episodes": len(run.episodes), "seeds": len(run.evaluations), "scenes": len(run.keys)}
+
     def as_dict(self) -> dict[str, Any]:
         """Return the row as plain data."""
-        counts = {"episodes": self.episodes, "seeds": self.seeds, "scenes": self.scenes}
-        values = {
-            key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()
-        }
-        return {"label": self.label, "task": self.task, **counts, **self.constants, **values}
+        values = {key: asdict(value) if isinstance(value, Interval) else value for key, value in self.values.items()}
+        known = {"label": self.run.label, "task": self.run.task}
+        return {**known, **self.counts, **self.run.constants, **values}
 
 
 def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSummary:
@@ -78,15 +68,7 @@ def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSu
         DatasetError: The operator's run lacks scenes and targets, or played another world.
     """
     return RunSummary(
-        label=run.label,
-        task=run.task,
-        measures=run.measures,
-        episodes=len(run.episodes),
-        seeds=len(run.evaluations),
-        scenes=len(run.keys),
-        constants=run.constants,
-        setting=run.setting,
-        values={column.key: _value(column, run, operator, rng) for column in run.measures.columns},
+        run=run, values={column.key: _value(column, run, operator, rng) for column in run.measures.columns}
     )
 
 

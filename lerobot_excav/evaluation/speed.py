@@ -1,32 +1,17 @@
-"""How fast this machine simulates, records, trains and plans."""
+"""How fast this machine plays and records a task. `bench/` of the repository times soil and policies alone."""
 
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.rig import ExcavatorRig
 from lerobot_excav.datasets.record.simulation import play_demonstration
-from lerobot_excav.envs.tasks.settings import FIDELITIES
-
-_SOIL_NUMBERS = (
-    ("", "real_time_factor", "x real time"),
-    (", half of the ticks", "p50_ms", "ms"),
-    (", 95 % of the ticks", "p95_ms", "ms"),
-    (", worst tick", "worst_ms", "ms"),
-    (", parcels (mean)", "mean_parcels", ""),
-    (", parcels (most)", "most_parcels", ""),
-    (", awake (mean)", "mean_awake", ""),
-    (", awake (most)", "most_awake", ""),
-)
-"""What is shown of `real_time_factor`: name, key, unit."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
+class Measurement(NamedTuple):
     """One measured number.
 
     Attributes:
@@ -39,68 +24,31 @@ class Measurement:
     value: float
     unit: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields by name."""
-        return asdict(self)
 
-
-def measure_soil(*, quick: bool) -> list[Measurement]:
-    """Measure the soil alone over a scripted dig cycle, in every fidelity; of several runs the quickest counts."""
-    from lerobot_excav.envs.soil.benchmark import real_time_factor
-
-    results = []
-    for fidelity in ("standard",) if quick else FIDELITIES:
-        runs = [real_time_factor(seed, fidelity) for seed in range(1 if quick else 3)]
-        best = max(runs, key=lambda run: run["real_time_factor"])
-        results += [
-            Measurement(name=f"soil alone, {fidelity}{what}", value=best[key], unit=unit)
-            for what, key, unit in _SOIL_NUMBERS
-        ]
-    return results
-
-
-def measure_environment(*, quick: bool) -> list[Measurement]:
+def measure_environment(settings: DemonstrationSettings) -> list[Measurement]:
     """Measure whole scripted episodes, in one process, without and with pictures."""
-    settings = DemonstrationSettings(scenes=1)
     results = []
     for name, with_images in (("environment", False), ("environment with pictures", True)):
-        rig = ExcavatorRig(with_images=with_images)
         # The first frames compile kernels and open the graphics context.
-        play_demonstration(rig, settings, settings.pairs()[0])
+        play_demonstration(settings, settings.pairs()[0], with_images=with_images)
         start, frames = time.perf_counter(), 0
-        for pair in settings.pairs()[: 1 if quick else 3]:
-            frames += play_demonstration(rig, settings, pair).length
+        for pair in settings.pairs():
+            frames += play_demonstration(settings, pair, with_images=with_images).length
         rate = frames / (time.perf_counter() - start)
         results += [
-            Measurement(name=name, value=rate, unit="steps/s"),
-            Measurement(name=name, value=rate / settings.fps, unit="x real time"),
+            Measurement(name, rate, "steps/s"),
+            Measurement(name, rate / settings.env.fps, "x real time"),
         ]
     return results
 
 
-def measure_demonstrations(*, quick: bool, workers: int) -> list[Measurement]:
-    """Measure recording, from nothing to a finished dataset."""
-    from lerobot_excav.datasets.record.demonstrations import record_demonstrations
-
-    settings = DemonstrationSettings(scenes=1 if quick else 3, keep_failures=True)
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "dataset"
-        summary = record_demonstrations(settings, out, workers=workers, show_progress=False)
-    name = f"demonstrations, {workers} workers, start included"
-    return [
-        Measurement(name=name, value=60.0 * summary.episodes / summary.wall_s, unit="episodes/min"),
-        Measurement(name=name, value=summary.simulated_s / summary.wall_s, unit="x real time"),
-    ]
-
-
-def measure_writing(*, quick: bool) -> list[Measurement]:
+def measure_writing(settings: DemonstrationSettings) -> list[Measurement]:
     """Measure storing and assembling alone: frames through the episode store and LeRobot's writer."""
     from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
     from lerobot_excav.datasets.record.episode_store import EpisodeStore
 
-    settings = DemonstrationSettings(scenes=1, episode_length=40 if quick else 120, keep_failures=True)
     pair = settings.pairs()[0]
-    episode = play_demonstration(ExcavatorRig(), settings, pair)
+    episode = play_demonstration(settings, pair)
     copies = [replace(episode, pair=pair._replace(scene_id=number)) for number in range(4)]
     with tempfile.TemporaryDirectory() as folder:
         store = EpisodeStore(Path(folder) / "episodes")
@@ -113,32 +61,32 @@ def measure_writing(*, quick: bool) -> list[Measurement]:
         elapsed = time.perf_counter() - start
         dataset.finalize()
     frames = episode.length * (len(copies) - 1)
-    return [Measurement(name="writing frames alone", value=frames / elapsed, unit="frames/s")]
+    return [Measurement("writing frames alone", frames / elapsed, "frames/s")]
 
 
-def measure_policies(*, quick: bool) -> list[Measurement]:
-    """Measure `mask_act` beside LeRobot's ACT."""
-    from lerobot_excav.policies.mask_act.benchmark import measure_policies as measure
+def measure_demonstrations(settings: DemonstrationSettings, *, workers: int) -> list[Measurement]:
+    """Measure recording, from nothing to a finished dataset."""
+    from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 
-    results = []
-    for speed in measure(rounds=2 if quick else 5):
-        results += [
-            Measurement(name=f"training {speed.name}", value=speed.training_samples_per_s, unit="samples/s"),
-            Measurement(name=f"planning {speed.name}", value=speed.inference_ms, unit="ms per chunk"),
-        ]
-    return results
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "dataset"
+        summary = record_demonstrations(settings, out, workers=workers, show_progress=False)
+    name = f"demonstrations, {workers} workers, start included"
+    return [
+        Measurement(name, 60.0 * summary.episodes / summary.wall_s, "episodes/min"),
+        Measurement(name, summary.simulated_s / summary.wall_s, "x real time"),
+    ]
 
 
-def measures(*, workers: int) -> dict[str, Callable[[bool], list[Measurement]]]:
-    """Return what can be measured, by name; each takes whether to be quick.
+def measures(settings: DemonstrationSettings, *, workers: int) -> dict[str, Callable[[], list[Measurement]]]:
+    """Return what can be measured, by name.
 
     Args:
+        settings: What is played and recorded.
         workers: Worker processes of the demonstrations.
     """
     return {
-        "soil": lambda quick: measure_soil(quick=quick),
-        "environment": lambda quick: measure_environment(quick=quick),
-        "writing": lambda quick: measure_writing(quick=quick),
-        "demos": lambda quick: measure_demonstrations(quick=quick, workers=workers),
-        "policy": lambda quick: measure_policies(quick=quick),
+        "environment": lambda: measure_environment(settings),
+        "writing": lambda: measure_writing(settings),
+        "demos": lambda: measure_demonstrations(settings, workers=workers),
     }

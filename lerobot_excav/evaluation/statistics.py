@@ -52,9 +52,7 @@ def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -
     return Interval(estimate=p, low=min(p, float(ends.low)), high=max(p, float(ends.high)))
 
 
-def bootstrap_mean(
-    values: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE
-) -> Interval:
+def bootstrap_mean(values: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE) -> Interval:
     """Estimate a mean with a percentile bootstrap interval.
 
     Args:

@@ -5,27 +5,52 @@ a connected robot announces itself here.
 """
 
 import weakref
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DeviceError
 
-if TYPE_CHECKING:
-    from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
-_connected: "weakref.WeakSet[SimulatedRobot[Any]]" = weakref.WeakSet()
+class LiveRobot(Protocol):
+    """What a teleoperator needs of the robot it drives.
+
+    Attributes:
+        name: As in `--robot.type`.
+        task_spec: The task.
+        episode_count: Number of resets so far; changes exactly when an episode starts.
+    """
+
+    name: str
+    task_spec: TaskSpec
+    episode_count: int
+
+    @property
+    def env(self) -> Any:
+        """The environment behind the robot."""
+
+    @property
+    def scene_id(self) -> int:
+        """Current scene."""
+
+    @property
+    def target_id(self) -> int:
+        """Target that is commanded first."""
 
 
-def announce(robot: "SimulatedRobot[Any]") -> None:
+_connected: "weakref.WeakSet[LiveRobot]" = weakref.WeakSet()
+
+
+def announce(robot: LiveRobot) -> None:
     """Make a robot that has just connected known."""
     _connected.add(robot)
 
 
-def retract(robot: "SimulatedRobot[Any]") -> None:
+def retract(robot: LiveRobot) -> None:
     """Forget a robot that disconnects; forgetting an unknown one changes nothing."""
     _connected.discard(robot)
 
 
-def connected_robot(robot_type: str) -> "SimulatedRobot[Any]":
+def connected_robot(robot_type: str) -> LiveRobot:
     """Return the one connected robot of a type.
 
     Args:

@@ -70,7 +70,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
 
     def make_env(self) -> MaskedTaskEnv[Any, Any]:
         """Make the environment that the configuration describes, without an end to its episodes."""
-        return self.task_spec.make_env(**{**self.settings.as_dict(), "episode_length": ENDLESS_FRAMES})
+        endless = {**self.settings.as_dict(), "episode_length": ENDLESS_FRAMES}
+        env: MaskedTaskEnv[Any, Any] = self.task_spec.make_env(**endless)
+        return env
 
     @property
     def observation_features(self) -> dict[str, type | tuple[int, int, int]]:
@@ -236,8 +238,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     def _require_mask(self, info: Mapping[str, Any]) -> None:
         if info.get("mask_missing"):
             raise MaskMissingError(
-                f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of scene "
-                f"{self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
+                f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of "
+                f"scene {self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
                 "with another --robot.scene_id or --robot.target_id, choose larger pictures or another source."
             )
 

@@ -31,11 +31,10 @@ class Arguments:
 
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
-        if hasattr(super(), "__post_init__"):
-            super().__post_init__()
+        getattr(super(), "__post_init__", lambda: None)()
 
 
-class EnvironmentChoice(draccus.ChoiceRegistry):
+class EnvironmentChoice(draccus.ChoiceRegistry):  # type: ignore[misc]  # draccus is untyped here
     """The settings of an environment, chosen by `--env.type` among those of the registry."""
 
     @classmethod
@@ -47,7 +46,7 @@ class EnvironmentChoice(draccus.ChoiceRegistry):
                 choice = type(f"--env.type={name}", (spec.settings, cls), {"PREFIX": "--env."})
                 choice.__doc__ = spec.settings.__doc__
                 cls._choice_registry[name] = dataclass(kw_only=True)(choice)
-        return cls._choice_registry
+        return dict(cls._choice_registry)
 
     @classmethod
     @override
@@ -91,7 +90,7 @@ def parse_arguments[Parsed: Arguments](
         exit_on_error=False,
     )
     try:
-        parsed = parser.parse_args(options)
+        parsed: Parsed = parser.parse_args(options)
     except (draccus.utils.DraccusException, argparse.ArgumentError) as error:
         raise ConfigurationError(f"{error}; `lerobot-excav {command} --help` lists the options") from None
     if first:
@@ -113,7 +112,7 @@ def _set_first(parsed: Arguments, words: list[str], command: str) -> None:
         raise ConfigurationError(f"one {name} is needed, not {len(words)}: {' '.join(words)}")
 
 
-class _HelpFormatter(SimpleHelpFormatter):
+class _HelpFormatter(SimpleHelpFormatter):  # type: ignore[misc]
     """LeRobot's formatter, without a default where there is none."""
 
     @override

@@ -1,133 +1,63 @@
-"""Measure this machine, let the scripted operator play many scenes, or put the soil to the test.
+"""Measure how fast this machine simulates, writes and records a task.
 
-Alone, `bench` times soil, environment, writing, recording and policies. `bench operator` writes a metrics file like
-that of lerobot-eval, to which `lerobot-excav report --operator=FILE` relates policies. `bench soil` repeats published
-experiments and tells which gates they pass; `bench fuzz` looks for impossible states after random actions.
+The repository has more: `python -m bench.soil` and `python -m bench.policy` time soil and policies alone.
 
 Examples:
-  lerobot-excav bench --quick --json=outputs/machine.json
-  lerobot-excav bench --only=soil,environment
-  lerobot-excav bench operator --scene-set=test --scenes=100 --metrics=outputs/operator.jsonl
-      100 test scenes with 4 targets each
-  lerobot-excav bench operator --first-scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
-      what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
-  lerobot-excav bench operator --env=fr5_grasp --scenes=100 --metrics=outputs/fr5_operator.jsonl
-      the arm's operator
-  lerobot-excav bench soil --report
-      docs/soil_validation.md and its plots; `bench soil --help` explains the experiments
-  lerobot-excav bench fuzz --steps=200000
-      random actions; `bench fuzz --help` tells what is checked
+  lerobot-excav bench
+      the excavator, three scenes
+  lerobot-excav bench --env.type=fr5_grasp --scenes=1 --targets=1 --json=outputs/machine.json
+      the arm, quickly; the numbers also go to a file
+  lerobot-excav bench --only=environment --env.soil=gravel --env.fidelity=fine
+      other soil, finer
 """
 
-import argparse
+import dataclasses
 import json
 import os
 import platform
+from dataclasses import dataclass
 from pathlib import Path
 
-from lerobot_excav.errors import require, require_choice
-from lerobot_excav.scripts import bench_fuzz, bench_soil
-from lerobot_excav.scripts.demonstration_arguments import DEFAULT_WORKERS, add_settings, settings_from
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
+from lerobot_excav.envs.tasks.registry import task_settings
+from lerobot_excav.envs.tasks.setting import declared_settings, setting, with_default
+from lerobot_excav.scripts.arguments import EnvironmentChoice
+from lerobot_excav.scripts.demos import WorkArguments, default_environment
 
-MEASURES = ("soil", "environment", "writing", "demos", "policy")
-
-_PARTS = {
-    "soil": (bench_soil, "hold the soil to published experiments"),
-    "fuzz": (bench_fuzz, "look for impossible states after random actions"),
-}
-"""Parts of `bench` with a module of their own, and what they do."""
+MEASURES = ("environment", "writing", "demos")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
-    parser.add_argument(
-        "--only",
-        help=f"what to time, out of {','.join(MEASURES)} (default: all)",
-    )
-    parser.add_argument(
-        "--workers",
-        dest="recording_workers",
-        type=int,
-        help=f"processes that record (default: {DEFAULT_WORKERS})",
-    )
-    parser.add_argument("--json", type=Path, help="also write the numbers to this file")
-    parts = parser.add_subparsers(dest="what", metavar="operator, soil, fuzz")
-    operator = parts.add_parser(
-        "operator",
-        help="let the scripted operator play scenes, without pictures",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    operator.add_argument("--metrics", type=Path, required=True, help="metrics file to write; must not exist")
-    operator.add_argument("--resume", action="store_true", help="continue an interrupted run, or start one")
-    add_settings(operator, scene_set="test", scenes=100)
-    for name, (command, help_text) in _PARTS.items():
-        part = parts.add_parser(
-            name,
-            help=help_text,
-            description=command.__doc__,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        command.add_arguments(part)
+@dataclass(kw_only=True)
+class BenchArguments(WorkArguments, PlayedScenes):
+    """Arguments of `lerobot-excav bench`."""
+
+    env: EnvironmentChoice = dataclasses.field(default_factory=default_environment)
+    """Environment, with its settings; the excavator by default."""
+
+    scenes: int = with_default(PlayedScenes, "scenes", 3)
+
+    only: str | None = setting("What to measure; left out: everything", default=None, choices=MEASURES)
+    json: Path | None = setting("File to which the numbers go as well", default=None)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: BenchArguments) -> int:
     """Measure, and print what was measured."""
-    if arguments.what is None:
-        return _machine(arguments)
-    _require_no_machine_options(arguments)
-    return _operator(arguments) if arguments.what == "operator" else _PARTS[arguments.what][0].run(arguments)
-
-
-def _machine(arguments: argparse.Namespace) -> int:
     from lerobot_excav.evaluation.speed import measures
 
-    names = list(MEASURES) if arguments.only is None else arguments.only.split(",")
-    for name in names:
-        require_choice("--only", name, MEASURES)
-    workers = arguments.recording_workers
-    tasks = measures(workers=DEFAULT_WORKERS if workers is None else workers)
-    print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    values = {name: getattr(arguments, name) for name in declared_settings(PlayedScenes)}
+    settings = DemonstrationSettings(env=task_settings(arguments.env), keep_failures=True, **values)
+    tasks = measures(settings, workers=arguments.workers)
+    machine = {"machine": platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
+    print(f"{machine['machine']}, {machine['cores']} cores, load {machine['load']:.1f}")
     results = []
-    for name in names:
-        for result in tasks[name](arguments.quick):
+    for name in MEASURES if arguments.only is None else (arguments.only,):
+        for result in tasks[name]():
             print(f"{result.name:42} {result.value:10.2f} {result.unit}", flush=True)
-            results.append(result.as_dict())
+            results.append(result._asdict())
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        machine = {"machine": platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
         arguments.json.write_text(json.dumps({**machine, "measurements": results}, indent=1) + "\n")
     return 0
 
 
-def _operator(arguments: argparse.Namespace) -> int:
-    from lerobot_excav.evaluation.metrics import read_evaluation
-    from lerobot_excav.evaluation.operator_run import evaluate_operator
-    from lerobot_excav.evaluation.report import make_report
-    from lerobot_excav.evaluation.report_text import report_text
-    from lerobot_excav.evaluation.run import Run
-
-    evaluate_operator(
-        settings_from(arguments), arguments.metrics, workers=arguments.workers, resume=arguments.resume
-    )
-    operator = Run(label="operator", evaluations=(read_evaluation(arguments.metrics),))
-    print(report_text(make_report([operator])))
-    print(f"written: {arguments.metrics}")
-    return 0
-
-
-def _require_no_machine_options(arguments: argparse.Namespace) -> None:
-    """Refuse options that stand before the name of a part and would be lost there."""
-    given = {
-        "--quick": arguments.quick,
-        "--only": arguments.only is not None,
-        "--json": arguments.json is not None,
-        "--workers": arguments.recording_workers is not None,
-    }
-    for option, is_given in given.items():
-        require(
-            not is_given,
-            f"{option} before `{arguments.what}` has no effect on it; if it knows the option, write it behind, "
-            "otherwise leave it out",
-        )
+ARGUMENTS = BenchArguments

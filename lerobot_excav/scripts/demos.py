@@ -29,13 +29,19 @@ from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 
 @dataclass(kw_only=True)
 class WorkArguments(Arguments):
-    """How work is spread and continued."""
+    """How work is spread."""
 
     workers: int = setting(
         "Processes that simulate; the result does not depend on it, and 0 works in this process",
         default=2,
         low=0,
     )
+
+
+@dataclass(kw_only=True)
+class ResumableArguments(WorkArguments):
+    """Work that can be continued."""
+
     resume: bool = setting("Whether to continue an interrupted run, or start one", default=False)
 
 
@@ -45,12 +51,10 @@ def default_environment(**settings: Any) -> Any:
 
 
 @dataclass(kw_only=True)
-class DemosArguments(WorkArguments, DemonstrationSettings):
+class DemosArguments(ResumableArguments, DemonstrationSettings):
     """Arguments of `lerobot-excav demos`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=default_environment
-    )
+    env: EnvironmentChoice = dataclasses.field(default_factory=default_environment)
     """Environment, with its settings; the excavator by default."""
     out: Path | None = setting("Folder of the dataset; must not exist", default=None)
 

@@ -11,32 +11,27 @@ Examples:
       ... with a title, a command to run it, and results in the card
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar, cast
 
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.scripts.arguments import Arguments
 
 
 @dataclass(kw_only=True)
-class ExportArguments:
+class ExportArguments(Arguments):
     """Arguments of `lerobot-excav export`."""
 
-    checkpoint: Path | None = field(
-        default=None, metadata={"custom_args": {"help": "pretrained_model folder of a run of lerobot-train"}}
-    )
-    out: Path = field(metadata={"custom_args": {"help": "folder to write"}})
-    title: str = field(default="mask_act", metadata={"custom_args": {"help": "heading of the card"}})
-    env: str = field(
-        default="excavator",
-        metadata={"custom_args": {"help": "environment in the card's command, as in --env.type"}},
-    )
-    results: Path | None = field(
-        default=None, metadata={"custom_args": {"help": "Markdown file for the card's section Evaluation"}}
-    )
-    license: str = field(
-        default="apache-2.0",
-        metadata={"custom_args": {"help": "licence in the card, as the Hugging Face Hub spells it"}},
-    )
+    POSITIONAL: ClassVar[str] = "checkpoint"
+
+    checkpoint: Path | None = setting("pretrained_model folder of a run of lerobot-train", default=None)
+    out: Path | None = setting("Folder to write", default=None)
+    title: str = setting("Heading of the card", default="mask_act")
+    env: str = setting("Environment in the card's command, as in --env.type", default="excavator")
+    results: Path | None = setting("Markdown file for the card's section Evaluation", default=None)
+    license: str = setting("Licence in the card, as the Hugging Face Hub spells it", default="apache-2.0")
 
 
 def run(arguments: ExportArguments) -> int:
@@ -53,13 +48,20 @@ def run(arguments: ExportArguments) -> int:
             "checkpoint is missing; give the pretrained_model folder of a run of lerobot-train, for example "
             "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging"
         )
+    require(
+        arguments.out is not None,
+        "--out is missing; give the folder to write, such as --out=checkpoints/digging",
+    )
     facts = CardFacts(
         title=arguments.title,
         env_type=arguments.env,
         results=arguments.results.read_text() if arguments.results is not None else "",
         license=arguments.license,
     )
-    out = export_checkpoint(arguments.checkpoint, arguments.out, facts)
+    out = export_checkpoint(arguments.checkpoint, cast(Path, arguments.out), facts)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0
+
+
+ARGUMENTS = ExportArguments

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from lerobot_excav.datasets.check.version_check import episodes_by_version, require_one_version, versions_of
+from lerobot_excav.datasets.format.version_check import episodes_by_version, require_one_version, versions_of
 from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split

@@ -6,7 +6,7 @@
 Examples:
   lerobot-excav operator --env.type=excavator --scenes=100 --metrics=outputs/operator.jsonl
       100 test scenes with 4 targets each
-  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/operator.jsonl
+  lerobot-excav operator --env.type=excavator --first_scene=1000 --scenes=40 --targets=1 --metrics=outputs/o.jsonl
       what lerobot-eval --env.scene_set=test --eval.n_episodes=40 shows with its default seed of 1000
   lerobot-excav operator --env.type=fr5_grasp --env.retarget_frame=100 --scenes=100 --metrics=outputs/fr5_operator.jsonl
       the arm's operator, whose command changes after 2 s
@@ -21,18 +21,16 @@ from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import EnvironmentChoice
-from lerobot_excav.scripts.demos import WorkArguments, default_environment, played
+from lerobot_excav.scripts.demos import ResumableArguments, default_environment, played
 
 MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay")
 
 
 @dataclass(kw_only=True)
-class OperatorArguments(WorkArguments, PlayedScenes):
+class OperatorArguments(ResumableArguments, PlayedScenes):
     """Arguments of `lerobot-excav operator`."""
 
-    env: EnvironmentChoice = dataclasses.field(  # type: ignore[assignment]
-        default_factory=lambda: default_environment(scene_set="test")
-    )
+    env: EnvironmentChoice = dataclasses.field(default_factory=lambda: default_environment(scene_set="test"))
     """Environment, with its settings; the excavator's test scenes by default."""
 
     metrics: Path | None = setting("Metrics file to write; must not exist", default=None)

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
+from lerobot_excav.envs.tasks.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report
@@ -31,26 +32,21 @@ from lerobot_excav.evaluation.run import Run
 from lerobot_excav.scripts.arguments import Arguments
 
 
-def _help(text: str) -> dict[str, dict[str, str]]:
-    return {"custom_args": {"help": text}}
-
-
 @dataclass(kw_only=True)
 class ReportArguments(Arguments):
-    """Options of `lerobot-excav report`."""
+    """Arguments of `lerobot-excav report`."""
 
     POSITIONAL: ClassVar[str] = "metrics"
 
-    metrics: list[str] = field(default_factory=list, metadata=_help("[LABEL=]FILE or folder, any number"))
-    rows: Path | None = field(default=None, metadata=_help("TOML file of a page, in place of METRICS"))
-    metrics_folder: Path | None = field(
-        default=None, metadata=_help("with --rows: folder of the metrics in place of the file's")
+    metrics: list[str] = field(default_factory=list)
+    """[LABEL=]FILE or folder, any number"""
+    rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
+    metrics_folder: Path | None = setting(
+        "With --rows: folder of the metrics in place of the file's", default=None
     )
-    operator: Path | None = field(
-        default=None, metadata=_help("metrics file of an operator on the same scenes")
-    )
-    out: Path | None = field(default=None, metadata=_help("folder for report.md and report.json"))
-    seed: int = field(default=0, metadata=_help("seed of the bootstrap"))
+    operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
+    out: Path | None = setting("Folder for report.md and report.json", default=None)
+    seed: int = setting("Seed of the bootstrap", default=0, low=0)
 
 
 def run(arguments: ReportArguments) -> int:

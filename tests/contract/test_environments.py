@@ -11,15 +11,16 @@ from lerobot.envs.configs import EnvConfig
 from numpy.typing import NDArray
 
 import lerobot_excav.plugin  # noqa: F401 - registers every --env.type
-from lerobot_excav.envs import GYM_IDS as ENVIRONMENTS
+from lerobot_excav.envs.tasks.registry import TASKS
 from lerobot_excav.errors import ConfigurationError
 
-GYM_IDS = sorted(gym_id for gym_id in gym.registry if gym_id.startswith("lerobot_excav/"))
+GYM_IDS = sorted(spec.gym_id for spec in TASKS.values() if spec.env_entry.startswith("lerobot_excav."))
 FRAMES = 12
 # What reports read of every task.
 METRICS = (
     *("simulation_version", "task", "scene_set", "scene_id", "target_id", "is_success", "frames"),
-    *("mask_condition", "mask_noise", "mask_noise_px", "fps", "episode_length"),
+    *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "target_overlay", "shown_target_id"),
+    *("fps", "episode_length", "commands", "mask_missing", "mask_missing_frames"),
 )
 
 Trace = list[tuple[dict[str, NDArray[Any]], float]]
@@ -64,11 +65,8 @@ def assert_same(a: Trace, b: Trace) -> None:
 
 def config_of(gym_id: str, **settings: Any) -> EnvConfig:
     """Make the configuration that LeRobot's `--env.type` makes of a task."""
-    task = gym_id.split("/")[1]
-    for kind in EnvConfig.get_known_choices().values():
-        if kind.__module__.startswith("lerobot_excav.") and task in kind.TASKS:
-            return kind(task=task, **settings)
-    raise AssertionError(f"no --env.type plays {gym_id}")
+    spec = TASKS[gym_id.split("/")[1]]
+    return EnvConfig.get_choice_class(spec.env_type)(task=spec.id, **settings)
 
 
 @pytest.fixture(scope="module", params=GYM_IDS)
@@ -90,7 +88,7 @@ def trace(env: gym.Env[Any, Any]) -> Trace:
 
 def test_there_is_an_environment() -> None:
     assert GYM_IDS
-    assert {f"lerobot_excav/{task}" for task in ENVIRONMENTS} == set(GYM_IDS)
+    assert set(GYM_IDS) <= set(gym.registry)
 
 
 # Joint velocities have no bound that a box could state.
@@ -237,7 +235,9 @@ def test_an_episode_lasts_at_least_a_frame_and_ends_with_its_metrics(gym_id: str
     assert (terminated, truncated) == (False, True)
     assert info["is_success"] is False
     metrics = info["episode_metrics"]
-    assert all(isinstance(value, (bool, int, float, str)) for value in metrics.values())
+    plain = {key: value for key, value in metrics.items() if key != "commands"}
+    assert all(isinstance(value, (bool, int, float, str)) for value in plain.values())
+    assert metrics["commands"] == [[0, info["target_id"]]]
     assert set(METRICS) <= set(metrics)
     env.close()
 
@@ -269,9 +269,7 @@ def test_an_impossible_target_is_refused(env: gym.Env[Any, Any]) -> None:
 
 
 @pytest.mark.parametrize("use_async", [False, True], ids=["one process", "own processes"])
-def test_lerobots_environments_give_the_same_bits_as_one_alone(
-    gym_id: str, trace: Trace, *, use_async: bool
-) -> None:
+def test_lerobots_environments_give_the_same_bits_as_one_alone(gym_id: str, trace: Trace, *, use_async: bool) -> None:
     # One frame more than is played: at the end of an episode LeRobot's wrapper repeats the last transition.
     config = config_of(gym_id, episode_length=FRAMES + 1)
     ((vector,),) = ([*tasks.values()] for tasks in config.create_envs(2, use_async_envs=use_async).values())
@@ -284,7 +282,6 @@ def test_lerobots_environments_give_the_same_bits_as_one_alone(
         played.append((flat(observation), reward))
     vector.close()
     of_seed_4 = [
-        ({key: array[0] for key, array in observation.items()}, float(reward[0]))
-        for observation, reward in played
+        ({key: array[0] for key, array in observation.items()}, float(reward[0])) for observation, reward in played
     ]
     assert_same(of_seed_4, trace)

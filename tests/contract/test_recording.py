@@ -62,9 +62,7 @@ def test_recording_again_repeats_the_scene(make_robot: MakeRobot, record_episode
     assert [(line["episode_index"], line["frames"]) for line in lines_of(robot)] == [(0, 2), (1, 5)]
 
 
-def test_a_resumed_recording_goes_on_where_it_stopped(
-    make_robot: MakeRobot, record_episode: RecordEpisode
-) -> None:
+def test_a_resumed_recording_goes_on_where_it_stopped(make_robot: MakeRobot, record_episode: RecordEpisode) -> None:
     assert record_episode(make_robot(), 6) == (1, 2, 0)
 
 
@@ -77,9 +75,7 @@ def test_with_buttons_only_the_scene_stays_until_a_press(
     assert record_episode(robot, 2) == (0, 1, 0)
 
 
-def test_a_press_leaves_one_target_out(
-    make_robot: MakeRobot, record_episode: RecordEpisode, still: Action
-) -> None:
+def test_a_press_leaves_one_target_out(make_robot: MakeRobot, record_episode: RecordEpisode, still: Action) -> None:
     robot = make_robot()
     record_episode(robot, 0)
     robot.send_action(still | {"next_scene": 1.0})

@@ -1,8 +1,8 @@
 """What every robot of this package does for LeRobot's commands, whatever machine it simulates."""
 
+import logging
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,26 +10,28 @@ import torch
 from lerobot.rollout.robot_wrapper import ThreadSafeRobot
 from lerobot.rollout.strategies.core import RolloutStrategy
 
+from lerobot_excav.datasets.complete.session import read_session
+from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.errors import ConfigurationError, DeviceError
 from lerobot_excav.robots import live
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
-MakeRobot = Callable[..., SimulatedRobot[Any]]
+MakeRobot = Callable[..., SimulatedRobot]
 Action = dict[str, float]
 
 
-def where(robot: SimulatedRobot[Any]) -> tuple[int, ...]:
+def where(robot: SimulatedRobot) -> tuple[int, ...]:
     """Return scene, target and number of steps, as the stand-in environment saw them."""
     observation = robot.get_observation()
-    return tuple(int(observation[name]) for name in robot.state_names[:3])
+    return tuple(int(observation[name]) for name in robot.task_spec.state_names[:3])
 
 
 def test_features_are_known_before_connecting(new_robot: MakeRobot) -> None:
     robot = new_robot(observation_height=64, observation_width=80)
-    features, scalars = robot.observation_features, len(robot.state_names)
-    assert dict(list(features.items())[:scalars]) == dict.fromkeys(robot.state_names, float)
+    features, scalars = robot.observation_features, len(robot.task_spec.state_names)
+    assert dict(list(features.items())[:scalars]) == dict.fromkeys(robot.task_spec.state_names, float)
     assert dict(list(features.items())[scalars:]) == dict.fromkeys(robot.cameras, (64, 80, 3))
-    assert robot.action_features == dict.fromkeys(robot.action_names, float)
+    assert robot.action_features == dict.fromkeys(robot.task_spec.action_names, float)
     assert len(robot.cameras) == 3
     assert {"main", "target_mask"} < set(robot.cameras)
     assert not robot.is_connected
@@ -38,7 +40,9 @@ def test_features_are_known_before_connecting(new_robot: MakeRobot) -> None:
 
 def test_rollout_keeps_every_scalar(new_robot: MakeRobot) -> None:
     robot = new_robot()
-    assert all(name.endswith((".pos", ".vel")) for name in (*robot.state_names, *robot.action_names))
+    assert all(
+        name.endswith((".pos", ".vel")) for name in (*robot.task_spec.state_names, *robot.task_spec.action_names)
+    )
 
 
 def test_observations_match_the_features(make_robot: MakeRobot) -> None:
@@ -69,7 +73,7 @@ def test_each_action_is_one_frame_and_is_clipped(make_robot: MakeRobot, still: A
     sent = robot.send_action(dict.fromkeys(still, 1e6))
     assert where(robot) == (0, 0, 2)
     assert list(sent) == list(still)
-    highest = np.broadcast_to(robot.action_high, len(still))
+    highest = np.broadcast_to(robot.task_spec.action_high, len(still))
     assert np.allclose(robot.env.actions[-1], highest)
     assert robot.env.actions[-1].dtype == np.float32
     assert list(sent.values()) == robot.env.actions[-1].tolist()
@@ -85,7 +89,7 @@ def test_a_recorded_action_comes_as_tensors_of_no_dimension(make_robot: MakeRobo
 def test_an_action_that_is_not_finite_is_refused(make_robot: MakeRobot, still: Action, value: float) -> None:
     robot = make_robot()
     with pytest.raises(DeviceError, match="is not finite; check the device or the policy"):
-        robot.send_action(still | {robot.action_names[2]: value})
+        robot.send_action(still | {robot.task_spec.action_names[2]: value})
     assert where(robot) == (0, 0, 0)
 
 
@@ -154,6 +158,59 @@ def test_a_rollout_can_drive_it_home(make_robot: MakeRobot, caplog: pytest.LogCa
     assert "Could not return" not in caplog.text
 
 
+def begin_episode(number: int) -> None:
+    """Say what lerobot-record says when it begins to record."""
+    level = logging.getLogger().level
+    logging.getLogger().setLevel(logging.NOTSET)
+    logging.info(f"Recording episode {number}")
+    logging.getLogger().setLevel(level)
+
+
+def test_positions_alone_restart_the_scene_once_where_the_machine_takes_none(
+    make_robot: MakeRobot, still: Action
+) -> None:
+    robot = make_robot()
+    home = {name: 0.0 for name in robot.task_spec.state_names if name.endswith(".pos")}
+    takes_positions = set(home) <= set(still)
+    robot.send_action(still)
+    resets = robot.episode_count
+    for _ in range(3):
+        robot.send_action(home)
+    assert robot.episode_count == resets + (not takes_positions)
+    robot.send_action(still)
+    robot.send_action(home)
+    assert robot.episode_count == resets + 2 * (not takes_positions)
+
+
+def test_the_session_log_tells_settings_and_commands(make_robot: MakeRobot, still: Action) -> None:
+    robot = make_robot(mask_noise="dilate", mask_noise_px=2, target_id=1)
+    begin_episode(0)
+    for target_id in (1, 1, 3, 3):
+        robot.env.target_id = target_id
+        robot.send_action(still)
+    path = robot.config.session_log
+    robot.disconnect()
+    (episode,) = read_session(path).values()
+    assert episode.commands == [[0, 1], [3, 3]]
+    assert episode.task_settings == robot.settings
+    assert (episode.env, episode.frames) == (robot.task_spec.env_type, 4)
+    assert episode.simulation_version == robot.task_spec.simulation_version
+
+
+def test_a_robot_without_a_mask_is_not_driven(make_robot: MakeRobot, still: Action) -> None:
+    robot = make_robot(target_id=1)
+    robot.env.mask_missing = True
+    for use in (lambda: robot.send_action(still), robot.start_scene):
+        with pytest.raises(MaskMissingError, match="'oracle' finds nothing for target 1 of scene 0"):
+            use()
+
+
+def test_depth_is_offered_on_request_only(make_robot: MakeRobot) -> None:
+    assert make_robot(depth=True).depth_m().shape == (96, 128)
+    with pytest.raises(DeviceError, match=r"--robot\.depth=true"):
+        make_robot().depth_m()
+
+
 def test_the_connected_robot_can_be_found(make_robot: MakeRobot, robot_type: str) -> None:
     with pytest.raises(DeviceError, match=f"0 robots of type {robot_type}.*--robot.type={robot_type}"):
         live.connected_robot(robot_type)
@@ -173,11 +230,13 @@ def test_the_connected_robot_can_be_found(make_robot: MakeRobot, robot_type: str
     [
         ("task", "Dance-v0", "-v0'"),
         ("fps", 30, "10, 25, 50"),
+        ("episode_length", 100, "--dataset.episode_time_s"),
         ("observation_height", 8, "32 to 1024"),
-        ("scene_set", "exam", "'train', 'val', 'test'"),
-        ("scene_id", -1, "from 0"),
+        ("scene_set", "exam", "train, val, test"),
+        ("mask_condition", "wrong", "mismatched"),
+        ("scene_id", -1, "from 0 to"),
         ("target_id", 4, "0, 1, 2, 3"),
-        ("advance", "never", "'episode', 'button'"),
+        ("advance", "never", "episode, button"),
     ],
 )
 def test_an_impossible_value_is_named_with_what_is_allowed(

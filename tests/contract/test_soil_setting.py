@@ -63,9 +63,7 @@ def the_operators_benchmark(soil: str, folder: Path) -> NDArray[Any]:
     [the_environment, the_robot, the_demonstrations, the_operators_benchmark],
     ids=lambda f: f.__name__,
 )
-def test_every_command_digs_the_soil_it_is_given(
-    start: Callable[[str, Path], NDArray[Any]], tmp_path: Path
-) -> None:
+def test_every_command_digs_the_soil_it_is_given(start: Callable[[str, Path], NDArray[Any]], tmp_path: Path) -> None:
     seen = {soil: start(soil, tmp_path).tobytes() for soil in SOILS}
     assert len(set(seen.values())) == len(SOILS)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ CONFIGS = {
 SCRIPTED = sorted(name for name, config in CONFIGS.items() if issubclass(config, ScriptedTeleoperatorConfig))
 FRAMES = 25
 
-MakeOperator = Callable[..., ScriptedTeleoperator[Any]]
+MakeOperator = Callable[..., ScriptedTeleoperator]
 Action = dict[str, float]
 
 
@@ -60,7 +59,7 @@ def test_it_needs_neither_calibration_nor_feedback(name: str, tmp_path: Path) ->
 def make_operator(request: pytest.FixtureRequest, tmp_path: Path) -> MakeOperator:
     """Make a connected scripted operator."""
 
-    def _make(seed: int = 0) -> ScriptedTeleoperator[Any]:
+    def _make(seed: int = 0) -> ScriptedTeleoperator:
         config = CONFIGS[request.param](calibration_dir=tmp_path, seed=seed)
         operator = make_teleoperator_from_config(config)
         assert isinstance(operator, ScriptedTeleoperator)
@@ -71,7 +70,7 @@ def make_operator(request: pytest.FixtureRequest, tmp_path: Path) -> MakeOperato
 
 
 @pytest.fixture
-def robot(make_operator: MakeOperator, tmp_path: Path) -> Iterator[SimulatedRobot[Any]]:
+def robot(make_operator: MakeOperator, tmp_path: Path) -> Iterator[SimulatedRobot]:
     """Make the robot that the operator drives, not connected."""
     settings = {"observation_height": 32, "observation_width": 32, "scene_id": 1, "target_id": 2}
     config = RobotConfig.get_choice_class(make_operator().robot_type)(calibration_dir=tmp_path, **settings)
@@ -82,7 +81,7 @@ def robot(make_operator: MakeOperator, tmp_path: Path) -> Iterator[SimulatedRobo
         robot.disconnect()
 
 
-def drive(robot: SimulatedRobot[Any], operator: ScriptedTeleoperator[Any]) -> list[Action]:
+def drive(robot: SimulatedRobot, operator: ScriptedTeleoperator) -> list[Action]:
     actions = []
     for _ in range(FRAMES):
         actions.append(operator.get_action())
@@ -91,7 +90,7 @@ def drive(robot: SimulatedRobot[Any], operator: ScriptedTeleoperator[Any]) -> li
 
 
 def test_a_restarted_scene_is_demonstrated_again_in_the_same_way(
-    robot: SimulatedRobot[Any], make_operator: MakeOperator
+    robot: SimulatedRobot, make_operator: MakeOperator
 ) -> None:
     operator = make_operator()  # connected before the robot, as lerobot-record does
     robot.connect()
@@ -102,16 +101,14 @@ def test_a_restarted_scene_is_demonstrated_again_in_the_same_way(
     assert drive(robot, operator) != first
 
 
-def test_the_seed_changes_the_demonstration(robot: SimulatedRobot[Any], make_operator: MakeOperator) -> None:
+def test_the_seed_changes_the_demonstration(robot: SimulatedRobot, make_operator: MakeOperator) -> None:
     robot.connect()
     first = drive(robot, make_operator(seed=0))
     robot.send_action(first[-1] | {"reinitialise": 1.0})
     assert drive(robot, make_operator(seed=1)) != first
 
 
-def test_what_it_records_is_what_the_robot_carries_out(
-    robot: SimulatedRobot[Any], make_operator: MakeOperator
-) -> None:
+def test_what_it_records_is_what_the_robot_carries_out(robot: SimulatedRobot, make_operator: MakeOperator) -> None:
     robot.connect()
     operator = make_operator()
     action = operator.get_action()

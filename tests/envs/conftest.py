@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
-from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.grasp.operator import GraspOperator
 from lerobot_excav.envs.tasks.grasp.scene import draw_scene
 from lerobot_excav.envs.tasks.grasp.task import GraspTask
 
@@ -25,8 +25,8 @@ def _play(workcell, scene_id, target_id, *, seed=0, frames=400, fps=50, retarget
     scene = draw_scene("train", scene_id)
     workcell.reset(scene)
     view = OperatedCell(workcell, target_id, fps)
-    task = GraspTask(workcell, scene, target_id)
-    operator = ScriptedOperator(rng=np.random.default_rng(seed))
+    task = GraspTask(workcell, target_id)
+    operator = GraspOperator(rng=np.random.default_rng(seed))
     operator.reset(view)
     rewards, actions = [], []
     for frame in range(frames):

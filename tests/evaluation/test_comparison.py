@@ -13,9 +13,7 @@ def rng():
 def test_differences_are_paired_by_scene_and_target(make_run, scoop_line, rng):
     first = make_run("a", [scoop_line(i, target_success=i < 2, retained_mass_kg=100.0 * i) for i in range(8)])
     # The same scenes in another order, each 7 kg better.
-    second = make_run(
-        "b", [scoop_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))]
-    )
+    second = make_run("b", [scoop_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))])
     target, full, mass = compare(first, second, rng)
     assert target.difference.estimate == pytest.approx(0.75)
     assert target.p_value == pytest.approx(2 / 2**6)

@@ -38,9 +38,9 @@ def test_target_selection_is_told_apart_from_success(make_run, lines):
 def test_following_a_wrong_mask_is_told_apart_from_the_command(make_run, grasp_line):
     wrong = {**NOTHING, "mask_condition": "mismatched"}
     lines = [
-        *(grasp_line(i, **wrong, shown_block=(i + 1) % 4, first_grasped_block=(i + 1) % 4) for i in range(3)),
-        grasp_line(3, **wrong, shown_block=0, first_grasped_block=3),
-        grasp_line(4, **wrong, shown_block=1, first_grasped_block=-1),
+        *(grasp_line(i, **wrong, shown_target_id=(i + 1) % 4, first_grasped_block=(i + 1) % 4) for i in range(3)),
+        grasp_line(3, **wrong, shown_target_id=0, first_grasped_block=3),
+        grasp_line(4, **wrong, shown_target_id=1, first_grasped_block=-1),
     ]
     run = make_run("a", lines)
     (row,) = make_report([run]).runs
@@ -52,7 +52,7 @@ def test_following_a_wrong_mask_is_told_apart_from_the_command(make_run, grasp_l
 @pytest.mark.parametrize(
     ("changes", "keys"),
     [
-        ({"mask_condition": "zero", "shown_block": -1}, ["mask_followed"]),
+        ({"mask_condition": "zero", "shown_target_id": -1}, ["mask_followed"]),
         ({"first_grasped_block": -1}, ["target_selection", "mask_followed", "placed"]),
     ],
 )
@@ -69,7 +69,7 @@ def test_after_a_change_of_the_command_the_last_one_counts(make_run, grasp_line)
     ]
     (row,) = make_report([make_run("a", lines)]).runs
     assert row["first_grasped"] == {"commanded": 1, "other": 1, "none": 0}
-    assert row.setting == {"mask": "correct, changed at frame 25"}
+    assert row.run.setting == {"mask": "correct, changed at frame 25"}
 
 
 @pytest.mark.parametrize(
@@ -86,9 +86,7 @@ def test_the_words_of_a_mask_say_all_that_was_done_to_it(make_run, grasp_line, c
 
 
 def test_a_run_does_not_mix_times_at_which_the_command_changes(make_run, grasp_line):
-    with pytest.raises(
-        ConfigurationError, match=r"a mixes times at which the command changes: \(\) and \(9,\)"
-    ):
+    with pytest.raises(ConfigurationError, match=r"a mixes times at which the command changes: \(\) and \(9,\)"):
         make_run("a", [grasp_line(0), grasp_line(1, commands=[[0, 1], [9, 2]])])
 
 

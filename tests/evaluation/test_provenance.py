@@ -14,16 +14,12 @@ def evaluation(write_training, tmp_path, monkeypatch):
     """Evaluate the checkpoint `last` of 5000 steps; returns the metrics file."""
     last = write_training("mine", 5000).parent / "last"
     last.symlink_to("005000")
-    monkeypatch.setattr(
-        sys, "argv", ["/bin/lerobot-eval", f"--policy.path={last}/pretrained_model", "--x=a b"]
-    )
+    monkeypatch.setattr(sys, "argv", ["/bin/lerobot-eval", f"--policy.path={last}/pretrained_model", "--x=a b"])
     write_provenance(tmp_path / "metrics.jsonl")
     return tmp_path / "metrics.jsonl"
 
 
-def test_an_evaluation_keeps_its_command_and_the_training_that_its_policy_had(
-    evaluation, write_training, tmp_path
-):
+def test_an_evaluation_keeps_its_command_and_the_training_that_its_policy_had(evaluation, write_training, tmp_path):
     newer = write_training("mine", 10000)
     (newer.parent / "last").unlink()
     (newer.parent / "last").symlink_to(newer.name)

@@ -9,31 +9,29 @@ from lerobot_excav.evaluation.report_text import report_text
 
 @pytest.fixture
 def runs(make_run, scoop_line):
-    half = make_run(
-        "half", [scoop_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)]
-    )
+    half = make_run("half", [scoop_line(i, target_success=i % 2 == 0, retained_mass_kg=150.0) for i in range(10)])
     full = make_run("full", *[[scoop_line(i, retained_mass_kg=280.0) for i in range(10)]] * 2)
     return [half, full]
 
 
 @pytest.fixture
 def operator(make_run, scoop_line):
-    return make_run(
-        "operator", [scoop_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)]
-    )
+    return make_run("operator", [scoop_line(i, operator="scripted", retained_mass_kg=400.0) for i in range(12)])
 
 
 def test_rates_count_episodes_and_masses_count_scenes(runs):
     half, full = make_report(runs).runs
-    assert (half["target_success"].estimate, half.episodes, half.seeds, half.scenes) == (0.5, 10, 1, 10)
-    assert (full["target_success"].estimate, full.episodes, full.seeds, full.scenes) == (1.0, 20, 2, 10)
+    assert half["target_success"].estimate == 0.5
+    assert half.counts == {"episodes": 10, "seeds": 1, "scenes": 10}
+    assert full["target_success"].estimate == 1.0
+    assert full.counts == {"episodes": 20, "seeds": 2, "scenes": 10}
     assert full["retained_mass_kg"].estimate == 280.0
     assert half["efficiency"] is None
 
 
 def test_efficiency_relates_to_the_operator_on_the_same_scenes(runs, operator):
     report = make_report(runs, operator=operator)
-    assert [run.label for run in report.runs] == ["half", "full", "operator"]
+    assert [row.run.label for row in report.runs] == ["half", "full", "operator"]
     assert [run["efficiency"].estimate for run in report.runs] == pytest.approx([0.375, 0.7, 1.0])
     assert report.operator == "scripted"
 

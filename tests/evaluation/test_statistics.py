@@ -56,9 +56,7 @@ def test_more_confidence_widens_the_interval():
     assert wilson_interval(5, 10, confidence=0.99).high > wilson_interval(5, 10, confidence=0.9).high
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "p"), [(0, 0, 1.0), (0, 5, 0.0625), (1, 9, 0.021484375), (5, 5, 1.0)]
-)
+@pytest.mark.parametrize(("first", "second", "p"), [(0, 0, 1.0), (0, 5, 0.0625), (1, 9, 0.021484375), (5, 5, 1.0)])
 def test_mcnemar_is_the_two_sided_binomial_test(first, second, p):
     assert mcnemar_exact(first, second) == pytest.approx(p)
     assert mcnemar_exact(second, first) == mcnemar_exact(first, second)

@@ -7,9 +7,7 @@ from lerobot_excav.evaluation.training import read_training
 from lerobot_excav.evaluation.training_log import read_training_log
 
 START = "INFO 2026-01-01 {} ot_train.py:597 Start offline training on a fixed dataset, with effective batch size: 16\n"
-SAVED = (
-    "Training:  72%|##| 9/9 [1:00<2:00]INFO 2026-01-01 {} ot_train.py:687 Checkpoint policy after step {}\n"
-)
+SAVED = "Training:  72%|##| 9/9 [1:00<2:00]INFO 2026-01-01 {} ot_train.py:687 Checkpoint policy after step {}\n"
 FIRST = START.format("12:00:00") + SAVED.format("12:10:00", 900)
 LOST = FIRST + SAVED.format("12:20:00", 1800)
 
@@ -18,12 +16,8 @@ LOST = FIRST + SAVED.format("12:20:00", 1800)
     ("text", "minutes"),
     [
         pytest.param(START.format("12:00:00"), {}, id="nothing saved yet"),
-        pytest.param(
-            "INFO 2026-01-01 11:00:00 x Creating dataset\n" + FIRST, {900: 10.0}, id="from the first step"
-        ),
-        pytest.param(
-            FIRST + SAVED.format("12:20:30", 1800), {900: 10.0, 1800: 20.5}, id="to each checkpoint"
-        ),
+        pytest.param("INFO 2026-01-01 11:00:00 x Creating dataset\n" + FIRST, {900: 10.0}, id="from the first step"),
+        pytest.param(FIRST + SAVED.format("12:20:30", 1800), {900: 10.0, 1800: 20.5}, id="to each checkpoint"),
         pytest.param(
             FIRST + "\nKilled\n" + START.format("15:00:00") + SAVED.format("15:05:00", 1800),
             {900: 10.0, 1800: 15.0},
@@ -47,9 +41,7 @@ def test_minutes_count_what_led_to_a_checkpoint(tmp_path, text, minutes):
 
 
 def test_a_log_tells_the_command_and_the_commit_that_began_it(tmp_path):
-    (tmp_path / "t.log").write_text(
-        f"# commit 0123abc\n$ lerobot-train --x=1\n{FIRST}$ lerobot-train --resume=true\n"
-    )
+    (tmp_path / "t.log").write_text(f"# commit 0123abc\n$ lerobot-train --x=1\n{FIRST}$ lerobot-train --resume=true\n")
     log = read_training_log(tmp_path / "t.log")
     assert (log.command, log.commit) == ("lerobot-train --x=1", "0123abc")
 

@@ -43,9 +43,7 @@ def plan(checkpoint):
 
 def test_stock_act_trains_on_the_tinted_picture_and_leaves_the_mask_alone(dataset, checkpoint, plan):
     assert list(json.loads((checkpoint / "config.json").read_text())["input_features"]) == list(INPUTS)
-    observation = {
-        key: value for key, value in LeRobotDataset("tests/tiny", root=dataset)[0].items() if "obs" in key
-    }
+    observation = {key: value for key, value in LeRobotDataset("tests/tiny", root=dataset)[0].items() if "obs" in key}
     tinted = plan(observation)
     assert tinted.shape == (1, 8, 4)
     assert torch.isfinite(tinted).all()

@@ -2,9 +2,9 @@ import shutil
 from dataclasses import replace
 
 import pytest
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 
 from lerobot_excav.datasets.pairs.paired_index import build_index, store_index
-from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 from lerobot_excav.scripts.main import main
 
 

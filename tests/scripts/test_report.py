@@ -6,22 +6,17 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.main import main
 from lerobot_excav.scripts.report import runs_from
 
+from ..evaluation.conftest import grasp
+
 
 @pytest.fixture
 def metrics(tmp_path):
-    """Write a metrics file with one episode per given retained mass."""
+    """Write a metrics file with one episode per given return."""
 
-    def write(name, *masses):
+    def write(name, *returns):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
-        common = {"scene_set": "test", "target_id": 0, "mask_condition": "correct"}
-        common |= {"soil": "sand", "fidelity": "standard"}
-        outcome = {"target_success": True, "is_success": True, "residual_bucket_mass_kg": 0.0}
-        events = {"hard_target_contacts": 0, "spill_before_target_events": 0}
-        lines = [
-            {**common, **outcome, **events, "scene_id": number, "retained_mass_kg": mass}
-            for number, mass in enumerate(masses)
-        ]
+        lines = [grasp(number, episode_return=value) for number, value in enumerate(returns)]
         path.write_text("".join(json.dumps(line) + "\n" for line in lines))
         return path
 
@@ -32,8 +27,8 @@ def test_a_report_is_printed_and_written(metrics, tmp_path, capsys):
     policy, operator = metrics("policy.jsonl", 200.0, 220.0), metrics("operator.jsonl", 400.0, 440.0)
     assert main(["report", str(policy), f"--operator={operator}", f"--out={tmp_path / 'r'}"]) == 0
     text = capsys.readouterr().out
-    assert "50.0 [50.0, 50.0]" in text
-    assert "operator: not stated" in text
+    assert "210.0 [200.0, 220.0]" in text
+    assert "Operator: not stated" in text
     assert json.loads((tmp_path / "r" / "report.json").read_text())["runs"][0]["label"] == "policy"
     assert (tmp_path / "r" / "report.md").is_file()
 
@@ -45,14 +40,9 @@ def test_files_of_one_label_are_seeds_of_one_run(metrics):
     assert (second.label, len(second.evaluations)) == ("b", 1)
 
 
-def test_a_file_called_metrics_is_named_by_its_folder(metrics):
+def test_a_file_called_metrics_and_its_folder_are_named_by_the_folder(metrics):
     path = metrics("masked/metrics.jsonl", 1.0)
-    assert [run.label for run in runs_from([str(path)])] == ["masked"]
-
-
-def test_a_folder_is_named_by_itself(metrics):
-    path = metrics("masked/metrics.jsonl", 1.0)
-    assert [run.label for run in runs_from([str(path.parent)])] == ["masked"]
+    assert [runs_from([str(name)])[0].label for name in (path, path.parent)] == ["masked", "masked"]
 
 
 @pytest.mark.parametrize(("first", "second"), [("", ""), ("", "m="), ("m=", "")])
@@ -64,9 +54,7 @@ def test_only_an_explicit_label_makes_files_seeds_of_one_run(metrics, first, sec
 
 def test_a_path_may_hold_an_equals_sign(metrics):
     path = metrics("lr=1/m.jsonl", 1.0)
-    labels = [run.label for run in runs_from([str(path)])]
-    assert labels == ["m"]
-    assert [run.label for run in runs_from([f"a={path}"])] == ["a"]
+    assert [runs_from([name])[0].label for name in (str(path), f"a={path}")] == ["m", "a"]
 
 
 def test_a_file_given_twice_is_refused(metrics):
@@ -86,9 +74,9 @@ def rows(metrics, tmp_path):
     """A page of two rows, one of which was run."""
     metrics("test/mine.jsonl", 200.0, 220.0)
     path = tmp_path / "rows.toml"
-    row = '{ label = "mine", about = "my policy", paper = { full_success = 91.0 } }'
+    row = '{ label = "mine", about = "my policy", paper = { success = 91.0 } }'
     path.write_text(f'''
-title = "Digging"
+title = "Grasping"
 metrics = "{tmp_path}/test"
 [[section]]
 title = "All"
@@ -100,22 +88,16 @@ rows = [{row}, {{ label = "yours", about = "your policy" }}]
 def test_a_page_is_printed(rows, capsys):
     assert main(["report", f"--rows={rows}"]) == 0
     text = capsys.readouterr().out
-    assert "# Digging" in text
-    assert "| my policy | sand | correct | 2" in text
-    assert "| 91 " in text
-    assert "Not run: yours." in text
+    for shown in ("# Grasping", "| my policy | correct | 2", "| 91 ", "Not run: yours."):
+        assert shown in text
 
 
-def test_a_page_is_written_and_made_anew_from_its_metrics(rows, tmp_path, capsys):
-    assert main(["report", f"--rows={rows}", f"--out={tmp_path / 'page'}"]) == 0
-    again = [
-        "report",
-        f"--rows={rows}",
-        f"--metrics={tmp_path / 'page/metrics'}",
-        f"--out={tmp_path / 'again'}",
-    ]
-    assert main(again) == 0
-    first, second = (tmp_path / name / "report.md" for name in ("page", "again"))
+def test_a_page_is_written_and_made_again_from_its_metrics(rows, tmp_path, capsys):
+    folders = [tmp_path / "page", tmp_path / "again"]
+    assert main(["report", f"--rows={rows}", f"--out={folders[0]}"]) == 0
+    copies = f"--metrics_folder={folders[0] / 'metrics'}"
+    assert main(["report", f"--rows={rows}", copies, f"--out={folders[1]}"]) == 0
+    first, second = (folder / "report.md" for folder in folders)
     assert first.read_text() == second.read_text()
     assert f"written: {second}" in capsys.readouterr().out
 
@@ -123,10 +105,10 @@ def test_a_page_is_written_and_made_anew_from_its_metrics(rows, tmp_path, capsys
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "give either RESULTS or --rows"),
-        (["a.jsonl", "--rows=r.toml"], "give either RESULTS or --rows"),
-        (["a.jsonl", "--metrics=m"], "--metrics=m is of use with --rows only"),
-        (["--rows=r.toml", "--operator=o"], "--operator is of use with RESULTS only"),
+        ([], "give either metrics files or --rows"),
+        (["a.jsonl", "--rows=r.toml"], "give either metrics files or --rows"),
+        (["a.jsonl", "--metrics_folder=m"], "--metrics_folder=m is of use with --rows only"),
+        (["--rows=r.toml", "--operator=o"], "--operator is of use with metrics files only"),
     ],
 )
 def test_options_without_effect_are_refused(arguments, message, capsys):

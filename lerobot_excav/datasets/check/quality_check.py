@@ -10,9 +10,9 @@ import pandas as pd
 
 from lerobot_excav.datasets.check.episode_check import MAIN_KEY, episode_problems, scene_problems
 from lerobot_excav.datasets.check.replay_check import replay_problem
-from lerobot_excav.datasets.check.version_check import require_this_simulation, versions_of
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.format.schema import require_columns
+from lerobot_excav.datasets.format.version_check import require_this_simulation, versions_of
 from lerobot_excav.datasets.pairs.paired_index import FAILED, PASSED, build_index, index_keys, store_index
 from lerobot_excav.errors import require
 

@@ -1,7 +1,5 @@
 """Choosing episodes: paired, non-paired or balanced subsets of an index, without touching the dataset."""
 
-from typing import Literal
-
 import numpy as np
 import pandas as pd
 
@@ -9,8 +7,7 @@ from lerobot_excav.datasets.pairs.pair_coverage import pair_columns, start_colum
 from lerobot_excav.datasets.pairs.paired_index import FAILED
 from lerobot_excav.errors import DatasetError, require, require_choice
 
-Composition = Literal["all", "paired", "non-paired", "balanced"]
-COMPOSITIONS: tuple[Composition, ...] = ("all", "paired", "non-paired", "balanced")
+COMPOSITIONS = ("all", "paired", "non-paired", "balanced")
 
 
 def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFrame:
@@ -28,7 +25,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
 
 def select(
     index: pd.DataFrame,
-    composition: Composition,
+    composition: str,
     *,
     episodes: int | None = None,
     scenes: int | None = None,

@@ -5,7 +5,6 @@ last, and `eval_split = (k - 0.5) / n` makes the rounding give exactly k, whatev
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -13,8 +12,7 @@ import pandas as pd
 from lerobot_excav.datasets.pairs.pair_coverage import SCENE_COLUMNS
 from lerobot_excav.errors import DatasetError, require, require_choice
 
-SplitUnit = Literal["scene", "episode"]
-SPLIT_UNITS: tuple[SplitUnit, ...] = ("scene", "episode")
+SPLIT_UNITS = ("scene", "episode")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +39,7 @@ class Split:
         return [f"--dataset.episodes=[{episodes}]", f"--dataset.eval_split={self.eval_split!r}"]
 
 
-def split(rows: pd.DataFrame, unit: SplitUnit, *, eval_fraction: float = 0.2, seed: int = 0) -> Split:
+def split(rows: pd.DataFrame, unit: str, *, eval_fraction: float = 0.2, seed: int = 0) -> Split:
     """Hold out a part of the episodes.
 
     Args:

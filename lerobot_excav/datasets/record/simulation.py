@@ -53,11 +53,12 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
     """Make the environment of some settings, with pictures or without."""
-    return task_of_settings(settings).make_env(
+    env: MaskedTaskEnv[Any, Any] = task_of_settings(settings).make_env(
         obs_type="pixels_agent_pos" if with_images else "agent_pos",
         render_mode="rgb_array" if with_images else None,
         **settings.as_dict(),
     )
+    return env
 
 
 def make_replay_environment(

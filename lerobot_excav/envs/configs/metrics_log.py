@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from lerobot_excav.envs.configs.provenance import write_provenance
 from lerobot_excav.errors import ConfigurationError, require
 
 
@@ -86,6 +87,7 @@ class MetricsLog:
         self._finished[env_index] = self._line(env_index, info)
         if len(self._finished) == self._n_envs:
             self._append([self._finished[i] for i in range(self._n_envs)])
+            write_provenance(self.path)
 
     def _line(self, env_index: int, info: Mapping[str, Any]) -> dict[str, Any]:
         return {

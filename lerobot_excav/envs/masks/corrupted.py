@@ -57,9 +57,7 @@ class CorruptedSource:
         }
         return replace(shown, pixels=pixels, parameters=parameters) if pixels.any() else None
 
-    def _under_condition(
-        self, view: MaskView, command: Command, rng: np.random.Generator
-    ) -> TargetMask | None:
+    def _under_condition(self, view: MaskView, command: Command, rng: np.random.Generator) -> TargetMask | None:
         if self._condition == "zero":
             size = (view.camera.height, view.camera.width)
             return TargetMask(pixels=np.zeros(size, dtype=bool), target_id=None, source="none")

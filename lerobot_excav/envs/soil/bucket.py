@@ -7,9 +7,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.cutting import Window, cut, set_ceiling
+from lerobot_excav.envs.soil.cutting import cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
-from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.height_field import HeightField, Window
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, poses_between
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.birth import Intake
@@ -21,16 +21,7 @@ Array = NDArray[np.float64]
 LARGEST_MOTION_M = 1.0
 """Motion per step above which the tool must have been placed by hand: 50 m/s at a tick of 0.02 s."""
 
-_NO_WINDOW: Window = (0, 0, 0, 0)
-
-
-def _union(a: Window, b: Window) -> Window:
-    """Return the smallest window that holds both; an empty one does not count."""
-    if a[1] <= a[0] or a[3] <= a[2]:
-        return b
-    if b[1] <= b[0] or b[3] <= b[2]:
-        return a
-    return min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
+_NO_WINDOW = Window(0, 0, 0, 0)
 
 
 def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
@@ -88,9 +79,7 @@ class Bucket:
         """Volume that has entered and is not yet a parcel [m3]."""
         return 0.0 if self.intake is None else self.intake.waiting_m3
 
-    def move(
-        self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float
-    ) -> tuple[float, float]:
+    def move(self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float) -> tuple[float, float]:
         """Sweep the bucket from its last pose to this one.
 
         It takes in soil up to its heaped volume and pushes the rest ahead. A tool that was not there in the last step
@@ -115,12 +104,12 @@ class Bucket:
         if self.intake is None or not self.intake.belongs_to(geometry):
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
-            self.intake.volumes[0, 0] = waiting_m3
+            self.intake.bins.volumes[0, 0] = waiting_m3
         volumes_m3 = (0.0, 0.0)
         if before is not None:
             most = heaped_volume_m3(geometry, self._parameters.slope_tan) / self._parameters.swell
             room = max(0.0, most - load_m3 - self.waiting_m3)
-            steps = max(1, math.ceil(motion_m / (self._fidelity.substep_cells * min(field.grid[2:]))))
+            steps = max(1, math.ceil(motion_m / (self._fidelity.substep_cells * min(field.grid.cell_m))))
             path = poses_between(before, pose, steps)
             volumes_m3 = self._sweep(geometry, path, field, self.intake, room)
         self._cover(geometry, pose, field)
@@ -164,12 +153,12 @@ class Bucket:
                 field.active,
                 field.grid,
                 geometry.planes_t,
-                start.arrays,
-                end.arrays,
+                start,
+                end,
                 field.window(end.place(geometry.corners_t)),
                 self._fidelity.vertical_bins,
                 max(0.0, room - entered),
-                (intake.volumes, intake.frame),
+                intake.bins,
             )
             entered += more
             lost += over
@@ -184,8 +173,8 @@ class Bucket:
             field.ceiling,
             field.grid,
             geometry.planes_t,
-            *pose.arrays,
-            _union(window, self._window),
+            *pose,
+            window.union(self._window),
         )
         field.wake()
         self._window = window

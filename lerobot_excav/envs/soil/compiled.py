@@ -1,8 +1,8 @@
 """The one way this package compiles a kernel."""
 
+import ast
 import hashlib
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -13,17 +13,23 @@ _SOURCES = Path(__file__).parents[1]
 
 
 def _kernel_sources() -> list[str]:
-    """Return the sources that kernels are made of: files that hold any, and those whose constants they import."""
+    """Return the sources that kernels are made of: files that hold any, and what these import, near and far."""
     root = _SOURCES.parents[1]
     sources = {
         ".".join(path.relative_to(root).with_suffix("").parts): path.read_text(encoding="utf-8")
         for path in sorted(_SOURCES.rglob("*.py"))
     }
-    holders = {name for name, source in sources.items() if "@kernel" in source}
-    imported = {
-        name for holder in holders for name in re.findall(r"^from ([\w.]+) import", sources[holder], re.M)
-    }
-    return [source for name, source in sources.items() if name in holders | imported]
+    names = [name for name, source in sources.items() if "@kernel" in source]
+    for name in names:  # grows on the way
+        names += [found for found in _imports(sources[name]) if found in sources and found not in names]
+    return [sources[name] for name in sorted(names)]
+
+
+def _imports(source: str) -> list[str]:
+    """Return the names of the modules that a source may import, `from package import module` included."""
+    nodes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom) and node.module]
+    modules = {str(node.module) for node in nodes}
+    return sorted(modules | {f"{node.module}.{alias.name}" for node in nodes for alias in node.names})
 
 
 def _cache_directory() -> Path:

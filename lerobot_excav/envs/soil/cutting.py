@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.height_field import Grid, in_grid
-from lerobot_excav.envs.soil.parcels.birth import gather
+from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
+from lerobot_excav.envs.soil.motion import Pose
+from lerobot_excav.envs.soil.parcels.birth import Bins, gather
 from lerobot_excav.envs.soil.relaxation import mark_around
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
-Window = tuple[int, int, int, int]
-Intake = tuple[Array, tuple[float, float, float, float, float]]
 
 OPENING = 0
 """Index of the opening among the planes of a tool."""
@@ -41,9 +40,7 @@ def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> t
 
 
 @kernel
-def column_interval(
-    planes: Array, position: Array, rotation: Array, x: float, y: float
-) -> tuple[float, float, int]:
+def column_interval(planes: Array, position: Array, rotation: Array, x: float, y: float) -> tuple[float, float, int]:
     """Return the heights between which a vertical line is inside the bucket, and the face at the upper end.
 
     The interval is empty (low >= high) if the line misses the bucket.
@@ -79,11 +76,9 @@ def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[f
 
 
 @kernel
-def is_covered(
-    surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int
-) -> bool:
+def is_covered(surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int) -> bool:
     """Tell whether a surface height of a column lies inside the bucket or above it."""
-    x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
+    x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
     low, high, _ = column_interval(planes, position, rotation, x, y)
     return low < high and surface > low
 
@@ -109,15 +104,15 @@ def push_aside(
     while True:
         if not in_grid(heights, grid, x, y):
             return volume
-        i = int((x - grid[0]) / grid[2] + 0.5)
-        j = int((y - grid[1]) / grid[3] + 0.5)
-        raised = heights[i, j] + volume / (grid[2] * grid[3])
+        i = int((x - grid.x0) / grid.dx + 0.5)
+        j = int((y - grid.y0) / grid.dy + 0.5)
+        raised = heights[i, j] + volume / (grid.dx * grid.dy)
         if not is_covered(raised, grid, planes, position, rotation, i, j):
             heights[i, j] = raised
             mark_around(active, i, j)
             return 0.0
-        x += direction[0] * grid[2]
-        y += direction[1] * grid[3]
+        x += direction[0] * grid.dx
+        y += direction[1] * grid.dy
 
 
 @kernel
@@ -161,40 +156,48 @@ def cut_column(
     active: Mask,
     grid: Grid,
     planes: Array,
-    pose_before: tuple[Array, Array],
-    pose_now: tuple[Array, Array],
+    pose_before: Pose,
+    pose_now: Pose,
     i: int,
     j: int,
-    bins: int,
+    samples: int,
     room: float,
-    intake: Intake,
+    intake: Bins,
 ) -> tuple[float, float]:
     """Clear one column of the soil inside the bucket; return the volumes that entered and that left the grid."""
-    x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
-    low, high, top = column_interval(planes, pose_now[0], pose_now[1], x, y)
+    x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+    low, high, top = column_interval(planes, pose_now.position, pose_now.rotation, x, y)
     low, high = max(low, 0.0), min(high, heights[i, j])
     if high <= low:
         return 0.0, 0.0
-    share = (high - low) / bins * grid[2] * grid[3]
+    share = (high - low) / samples * grid.dx * grid.dy
     # the column sinks first, so that no pushed soil comes to rest on what is being taken away
     heights[i, j] = max(0.0, heights[i, j] - (high - low))
     mark_around(active, i, j)
     entered, lost = 0.0, 0.0
-    for b in range(bins):
-        z = low + (b + 0.5) * (high - low) / bins
-        before = to_tool(pose_before[0], pose_before[1], x, y, z)
-        now = to_tool(pose_now[0], pose_now[1], x, y, z)
+    for b in range(samples):
+        z = low + (b + 0.5) * (high - low) / samples
+        before = to_tool(pose_before.position, pose_before.rotation, x, y, z)
+        now = to_tool(pose_now.position, pose_now.rotation, x, y, z)
         face = crossed_face(planes, before, now)
         if face == ALREADY_INSIDE:
             face = top  # it fell in from above
         taken = min(share, room - entered) if face == OPENING else 0.0
         if taken > 0.0:
-            gather(intake[0], intake[1], now[0], now[1], now[2], taken)
+            gather(intake, now[0], now[1], now[2], taken)
             entered += taken
         if taken < share:
-            direction = push_direction(planes, pose_now[1], face, before, now)
+            direction = push_direction(planes, pose_now.rotation, face, before, now)
             lost += push_aside(
-                heights, active, grid, planes, pose_now[0], pose_now[1], (x, y), direction, share - taken
+                heights,
+                active,
+                grid,
+                planes,
+                pose_now.position,
+                pose_now.rotation,
+                (x, y),
+                direction,
+                share - taken,
             )
     return entered, lost
 
@@ -205,12 +208,12 @@ def cut(
     active: Mask,
     grid: Grid,
     planes: Array,
-    pose_before: tuple[Array, Array],
-    pose_now: tuple[Array, Array],
+    pose_before: Pose,
+    pose_now: Pose,
     window: Window,
-    bins: int,
+    samples: int,
     room: float,
-    intake: Intake,
+    intake: Bins,
 ) -> tuple[float, float]:
     """Move the bucket through the soil by one sub-step.
 
@@ -219,25 +222,35 @@ def cut(
         active: (nx, ny) avalanche marks, set where heights change.
         grid: First cell centre and cell sizes.
         planes: (m, 4) half-spaces of the bucket in its frame.
-        pose_before: Position (3,) and rotation (3, 3) at the start; z above the rigid floor.
-        pose_now: The same at the end.
-        window: Index ranges i0, i1, j0, j1 that hold the bucket at the end.
-        bins: Vertical samples per column.
+        pose_before: The bucket at the start.
+        pose_now: The bucket at the end.
+        window: Columns that hold the bucket at the end.
+        samples: Vertical samples per column.
         room: Volume that the bucket can still take [m3].
-        intake: Bins before the opening, which take what enters [m3], and their frame.
+        intake: Bins before the opening, which take what enters.
 
     Returns:
         Volumes [m3] that entered the bucket and that were pushed over the border.
     """
     entered, lost = 0.0, 0.0
-    for i in range(window[0], window[1]):
-        for j in range(window[2], window[3]):
+    for i in range(window.i0, window.i1):
+        for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
-                more = cut_column(
-                    heights, active, grid, planes, pose_before, pose_now, i, j, bins, room - entered, intake
+                more, over = cut_column(
+                    heights,
+                    active,
+                    grid,
+                    planes,
+                    pose_before,
+                    pose_now,
+                    i,
+                    j,
+                    samples,
+                    room - entered,
+                    intake,
                 )
-                entered += more[0]
-                lost += more[1]
+                entered += more
+                lost += over
     return entered, lost
 
 
@@ -256,13 +269,11 @@ def set_ceiling(
 
     The plates thereby hold back avalanches that the height field alone would let through them.
     """
-    for i in range(window[0], window[1]):
-        for j in range(window[2], window[3]):
-            x, y = grid[0] + i * grid[2], grid[1] + j * grid[3]
+    for i in range(window.i0, window.i1):
+        for j in range(window.j0, window.j1):
+            x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
             low, high, _ = column_interval(planes, position, rotation, x, y)
             new = low if low < high else math.inf
-            if new != ceiling[i, j] and (
-                new < heights[i, j] + grid[2] or ceiling[i, j] < heights[i, j] + grid[2]
-            ):
+            if new != ceiling[i, j] and (new < heights[i, j] + grid.dx or ceiling[i, j] < heights[i, j] + grid.dx):
                 mark_around(active, i, j)
             ceiling[i, j] = new

@@ -10,10 +10,10 @@ class Fidelity:
     Attributes:
         vertical_bins: Samples along the height of a column inside the bucket.
         substep_cells: Largest motion of the tool per sub-step, in cells.
-        sweeps_per_tick: Avalanche sweeps per 0.02 s; more let slopes come to rest sooner.
+        sweeps_per_tick: Avalanche sweeps per `TICK_S`; more let slopes come to rest sooner.
         force_slices: Lateral slices of the cutting edge in the force model.
         parcel_radius_m: Radius of one parcel.
-        substeps_per_tick: Sub-steps of the parcels' motion per 0.02 s.
+        substeps_per_tick: Sub-steps of the parcels' motion per `TICK_S`.
         most_awake: Bound on the number of parcels that move by themselves.
     """
 

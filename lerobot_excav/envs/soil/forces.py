@@ -10,14 +10,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.height_field import Grid
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, SoilParameters
+from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.envs.soil.plates import OuterFaces
 from lerobot_excav.envs.soil.pressure import PlatePressure
 from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
-from lerobot_excav.envs.soil.wedge import SoilNumbers, edge_limits
+from lerobot_excav.envs.soil.wedge import SoilStrength, edge_limits
 
 Array = NDArray[np.float64]
 
@@ -32,19 +33,19 @@ def bearing_factors(friction_rad: float) -> tuple[float, float, float]:
     )
 
 
-def soil_numbers(parameters: SoilParameters) -> SoilNumbers:
-    """Return the numbers of a soil in the form in which kernels take them."""
+def soil_strength(parameters: SoilParameters) -> SoilStrength:
+    """Return what the force model knows of a soil."""
     p = parameters
     cohesion, depth, width = bearing_factors(p.friction_angle_rad)
-    return (
-        p.density_kg_m3 * GRAVITY_M_S2,
-        p.friction_angle_rad,
-        p.steel_friction_angle_rad,
-        p.cohesion_pa,
-        cohesion,
-        depth,
-        width,
-        p.penetration_scale,
+    return SoilStrength(
+        unit_weight=p.density_kg_m3 * GRAVITY_M_S2,
+        friction=p.friction_angle_rad,
+        steel_friction=p.steel_friction_angle_rad,
+        cohesion=p.cohesion_pa,
+        bearing_cohesion=cohesion,
+        bearing_depth=depth,
+        bearing_width=width,
+        penetration_scale=p.penetration_scale,
     )
 
 
@@ -65,10 +66,10 @@ def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, w
     p = parameters
     spacing = depth_m / 100.0
     level: Array = np.full((2, 2), depth_m)
-    grid = (-spacing, -spacing, 2.0 * spacing, 2.0 * spacing)
+    grid = Grid.centred((2, 2), 2.0 * spacing, 2.0 * spacing)
     table = failure_table(p.friction_angle_rad, p.steel_friction_angle_rad)
     wedges, _ = edge_limits(
-        level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_numbers(p), table
+        level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p), table
     )
     angle = rake_rad + p.steel_friction_angle_rad
     return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
@@ -78,7 +79,7 @@ CLEAR_M = 0.1
 """A bucket whose inside stays this far above all soil touches none; its plates are thinner (PLATE_THICKNESS_M)."""
 
 
-class DiggingResistance:
+class SoilResistance:
     """Reaction of the soil to a bucket.
 
     Args:
@@ -88,7 +89,7 @@ class DiggingResistance:
 
     def __init__(self, parameters: SoilParameters, slices: int) -> None:
         self._slices = slices
-        self._soil = soil_numbers(parameters)
+        self._soil = soil_strength(parameters)
         self._table = failure_table(parameters.friction_angle_rad, parameters.steel_friction_angle_rad)
         self.forget()
 
@@ -157,9 +158,7 @@ class DiggingResistance:
         across = rotation @ -geometry.planes_t[1, :3]
         ahead = _ahead(rotation, along)
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
-        edges_t = np.stack(
-            [np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1
-        )
+        edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
         wedges, bearings = edge_limits(
             heights_m,
@@ -172,7 +171,7 @@ class DiggingResistance:
             self._soil,
             self._table,
         )
-        steel, shape = self._soil[2], edges.shape
+        steel, shape = self._soil.steel_friction, edges.shape
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
         pushes = wedges * math.cos(steel)
         return (

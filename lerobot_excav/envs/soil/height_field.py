@@ -1,5 +1,7 @@
 """A height field over a rectangle: heights, deposits, samples and its own avalanches."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,16 +11,62 @@ from lerobot_excav.errors import require
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
-Grid = tuple[float, float, float, float]
-"""Centre of the first cell x0, y0 and cell sizes dx, dy [m]: the form in which kernels take a grid."""
+
+
+class Grid(NamedTuple):
+    """Where the columns of a height field stand in its plane.
+
+    Attributes:
+        x0: Centre of the first cell along x [m].
+        y0: The same along y [m].
+        dx: Cell size along x [m].
+        dy: The same along y [m].
+    """
+
+    x0: float
+    y0: float
+    dx: float
+    dy: float
+
+    @classmethod
+    def centred(cls, shape: tuple[int, int], dx: float, dy: float) -> "Grid":
+        """Return a grid of so many cells about the origin."""
+        return cls(-0.5 * (shape[0] - 1) * dx, -0.5 * (shape[1] - 1) * dy, dx, dy)
+
+    @property
+    def first_m(self) -> tuple[float, float]:
+        """Centre of the first cell [m]."""
+        return self.x0, self.y0
+
+    @property
+    def cell_m(self) -> tuple[float, float]:
+        """Cell sizes [m]."""
+        return self.dx, self.dy
+
+
+class Window(NamedTuple):
+    """Ranges of the columns of a height field: from i0 to before i1 along x, from j0 to before j1 along y."""
+
+    i0: int
+    i1: int
+    j0: int
+    j1: int
+
+    def union(self, other: "Window") -> "Window":
+        """Return the smallest window that holds both; an empty one does not count."""
+        if self.i1 <= self.i0 or self.j1 <= self.j0:
+            return other
+        if other.i1 <= other.i0 or other.j1 <= other.j0:
+            return self
+        return Window(min(self.i0, other.i0), max(self.i1, other.i1), min(self.j0, other.j0), max(self.j1, other.j1))
 
 
 @kernel
 def surface_height(heights: Array, grid: Grid, x: float, y: float) -> float:
     """Interpolate heights bilinearly between cell centres; beyond the outer centres the nearest one holds."""
     nx, ny = heights.shape
-    u = min(max((x - grid[0]) / grid[2], 0.0), nx - 1.0)
-    v = min(max((y - grid[1]) / grid[3], 0.0), ny - 1.0)
+    u = min(max((x - grid.x0) / grid.dx, 0.0), nx - 1.0)
+    v = min(max((y - grid.y0) / grid.dy, 0.0), ny - 1.0)
     i, j = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0))
     k, m = min(i + 1, nx - 1), min(j + 1, ny - 1)
     a, b = u - i, v - j
@@ -31,7 +79,7 @@ def surface_height(heights: Array, grid: Grid, x: float, y: float) -> float:
 def in_grid(heights: Array, grid: Grid, x: float, y: float) -> bool:
     """Tell whether a point lies over the field."""
     nx, ny = heights.shape
-    u, v = (x - grid[0]) / grid[2] + 0.5, (y - grid[1]) / grid[3] + 0.5
+    u, v = (x - grid.x0) / grid.dx + 0.5, (y - grid.y0) / grid.dy + 0.5
     return 0.0 <= u < nx and 0.0 <= v < ny
 
 
@@ -44,7 +92,7 @@ def _sample(heights: Array, grid: Grid, points: Array) -> Array:
 
 
 @kernel
-def _tent(position: float) -> tuple[int, float, float, float, float]:
+def _tent(position: float) -> tuple[int, tuple[float, float, float, float]]:
     """Return the first of four cells around a position [cells] and their weights, which sum to 1.
 
     A tent two cells wide on each side: about the radius of the cone that one parcel makes. Weights of cells
@@ -52,23 +100,21 @@ def _tent(position: float) -> tuple[int, float, float, float, float]:
     """
     first = int(np.floor(position)) - 1
     f = position - np.floor(position)
-    return first, 0.25 * (1.0 - f), 0.25 * (2.0 - f), 0.25 * (1.0 + f), 0.25 * f
+    return first, (0.25 * (1.0 - f), 0.25 * (2.0 - f), 0.25 * (1.0 + f), 0.25 * f)
 
 
 @kernel
 def _deposit(heights: Array, active: Mask, grid: Grid, points: Array, volumes: Array) -> None:
     nx, ny = heights.shape
-    area = grid[2] * grid[3]
+    area = grid.dx * grid.dy
     for k in range(len(points)):
-        wx = _tent((points[k, 0] - grid[0]) / grid[2])
-        wy = _tent((points[k, 1] - grid[1]) / grid[3])
+        first_i, shares_x = _tent((points[k, 0] - grid.x0) / grid.dx)
+        first_j, shares_y = _tent((points[k, 1] - grid.y0) / grid.dy)
         for a in range(4):
-            i = min(max(wx[0] + a, 0), nx - 1)
-            share_x = (wx[1], wx[2], wx[3], wx[4])[a]
+            i = min(max(first_i + a, 0), nx - 1)
             for b in range(4):
-                j = min(max(wy[0] + b, 0), ny - 1)
-                share_y = (wy[1], wy[2], wy[3], wy[4])[b]
-                heights[i, j] += volumes[k] / area * share_x * share_y
+                j = min(max(first_j + b, 0), ny - 1)
+                heights[i, j] += volumes[k] / area * shares_x[a] * shares_y[b]
                 mark_around(active, i, j)
 
 
@@ -84,11 +130,10 @@ class HeightField:
 
     def __init__(self, shape: tuple[int, int], cell_m: tuple[float, float], border_height_m: float) -> None:
         """Make an empty field centred at the origin of its plane; soil above the border height runs off it."""
-        cell_m = (float(cell_m[0]), float(cell_m[1]))
         self.heights: Array = np.zeros(shape)
         self.active: Mask = np.zeros(shape, dtype=np.uint8)
         self.ceiling: Array = np.full(shape, np.inf)
-        self.grid: Grid = (-0.5 * (shape[0] - 1) * cell_m[0], -0.5 * (shape[1] - 1) * cell_m[1], *cell_m)
+        self.grid = Grid.centred(shape, float(cell_m[0]), float(cell_m[1]))
         self._delta: Array = np.zeros(shape)
         self._border_height_m = border_height_m
         self._at_rest = True
@@ -96,7 +141,7 @@ class HeightField:
     @property
     def cell_area_m2(self) -> float:
         """Area of one cell [m2]."""
-        return self.grid[2] * self.grid[3]
+        return self.grid.dx * self.grid.dy
 
     @property
     def volume_m3(self) -> float:
@@ -106,7 +151,7 @@ class HeightField:
     def centres(self, axis: int) -> Array:
         """Return the coordinates of the cell centres along x (0) or y (1) [m]."""
         steps = np.arange(self.heights.shape[axis], dtype=np.float64)
-        return np.asarray(self.grid[axis] + steps * self.grid[2 + axis])
+        return np.asarray(self.grid.first_m[axis] + steps * self.grid.cell_m[axis])
 
     def reset(self, heights_m: ArrayLike | None) -> None:
         """Replace all heights, byte for byte; zero if none are given.
@@ -116,9 +161,7 @@ class HeightField:
         """
         shape = self.heights.shape
         new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
-        require(
-            new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell."
-        )
+        require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
         require(
             bool(np.isfinite(new).all()),
             "heights_m holds values that are not finite; give metres above the floor.",
@@ -138,7 +181,7 @@ class HeightField:
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Tell which of (n, 2) points lie over the field."""
-        half = 0.5 * np.array(self.heights.shape) * self.grid[2:]
+        half = 0.5 * np.array(self.heights.shape) * self.grid.cell_m
         return np.asarray((np.abs(points) < half).all(axis=-1))
 
     def deposit(self, points: Array, volumes_m3: Array) -> None:
@@ -156,14 +199,14 @@ class HeightField:
         self.active[:] = 1
         self._at_rest = False
 
-    def window(self, points: Array) -> tuple[int, int, int, int]:
-        """Return index ranges i0, i1, j0, j1 of the columns under the bounding box of (n, 2 or 3) points."""
+    def window(self, points: Array) -> Window:
+        """Return the columns under the bounding box of (n, 2 or 3) points."""
         nx, ny = self.heights.shape
         low, high = points.min(axis=0), points.max(axis=0)
         x0, y0, dx, dy = self.grid
         i0, i1 = int(np.ceil((low[0] - x0) / dx)), int(np.floor((high[0] - x0) / dx)) + 1
         j0, j1 = int(np.ceil((low[1] - y0) / dy)), int(np.floor((high[1] - y0) / dy)) + 1
-        return min(max(i0, 0), nx), min(max(i1, 0), nx), min(max(j0, 0), ny), min(max(j1, 0), ny)
+        return Window(min(max(i0, 0), nx), min(max(i1, 0), nx), min(max(j0, 0), ny), min(max(j1, 0), ny))
 
     def relax(self, sweeps: int, slope_tan: float) -> float:
         """Let soil avalanche for some sweeps; return the volume [m3] that ran off over the border."""
@@ -171,9 +214,14 @@ class HeightField:
         for _ in range(sweeps):
             if self._at_rest:
                 break
-            cell_m = (self.grid[2], self.grid[3])
             over, changed = sweep(
-                self.heights, self._delta, self.active, self.ceiling, cell_m, slope_tan, self._border_height_m
+                self.heights,
+                self._delta,
+                self.active,
+                self.ceiling,
+                self.grid.cell_m,
+                slope_tan,
+                self._border_height_m,
             )
             lost += over
             self._at_rest = changed == 0

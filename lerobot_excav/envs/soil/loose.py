@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField
@@ -13,15 +14,12 @@ from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.dynamics import Laws
 from lerobot_excav.envs.soil.parcels.ground import Site
-from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxNumbers, ToolPath
+from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Landed, Population
 from lerobot_excav.envs.soil.parcels.store import WALLS
 from lerobot_excav.envs.soil.tool import ToolGeometry
 
 Array = NDArray[np.float64]
-
-TICK_S = 0.02
-"""Step for which the numbers of a `Fidelity` are meant."""
 
 _PHASE_PER_SUBSTEP = 0.2
 """Phase of a parcel on its contact spring per sub-step [rad] (tuned: stable up to a dozen contacts)."""
@@ -46,14 +44,14 @@ def _laws(parameters: SoilParameters, fidelity: Fidelity, mass_kg: float) -> Law
     )
 
 
-def _box_numbers(container: Container | None, floor_depth_m: float) -> BoxNumbers:
+def _box_walls(container: Container | None, floor_depth_m: float) -> BoxWalls:
     if container is None:
         return NO_BOX
     x, y, z = (float(v) for v in container.center_w)
     z += floor_depth_m
     cos, sin = (float(v) for v in container.axes_w[0])
     half_x, half_y = (float(v) for v in container.half_extent_m)
-    return (x, y, z, half_x, half_y, z + container.wall_height_m, cos, sin)
+    return BoxWalls(x, y, z, half_x, half_y, z + container.wall_height_m, cos, sin)
 
 
 class LooseSoil:
@@ -85,7 +83,7 @@ class LooseSoil:
         self._fidelity = fidelity
         self._field, self._box_field = field, box_field
         self._container = container
-        self._box = _box_numbers(container, floor_depth_m)
+        self._box = _box_walls(container, floor_depth_m)
         self._level_z = floor_depth_m
         self._density_kg_m3 = parameters.density_kg_m3
         self.population = Population(
@@ -100,9 +98,7 @@ class LooseSoil:
     def clear(self) -> None:
         """Remove all parcels and forget the bucket."""
         self.population.clear()
-        self._tool = ToolPath(
-            0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3)
-        )
+        self._tool = ToolPath(0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3))
 
     def step(
         self,
@@ -141,7 +137,7 @@ class LooseSoil:
         rows = np.flatnonzero((state.load == 0) & field.contains(state.positions[:, :2]))
         if len(rows) == 0:
             return field.heights
-        cells = (state.positions[rows, :2] - field.grid[:2]) / field.grid[2:]
+        cells = (state.positions[rows, :2] - field.grid.first_m) / field.grid.cell_m
         i, j = np.clip(np.rint(cells).astype(np.int64), 0, np.array(field.heights.shape) - 1).T
         heights = field.heights.copy()
         np.add.at(heights, (i, j), state.masses[rows] / self._density_kg_m3 / field.cell_area_m2)

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ from lerobot_excav.envs.soil.tool import Tool
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pose:
+class Pose(NamedTuple):
     """Position (3,) [m] with z above the rigid floor, and rotation (3, 3), as writable arrays for kernels."""
 
     position: Array
@@ -24,14 +23,7 @@ class Pose:
     @classmethod
     def of(cls, tool: Tool, floor_depth_m: float) -> "Pose":
         """Copy the pose of a tool."""
-        return cls(
-            position=tool.position_w + np.array([0.0, 0.0, floor_depth_m]), rotation=np.array(tool.rotation_w)
-        )
-
-    @property
-    def arrays(self) -> tuple[Array, Array]:
-        """Return position and rotation in the form that kernels take."""
-        return self.position, self.rotation
+        return cls(position=tool.position_w + np.array([0.0, 0.0, floor_depth_m]), rotation=np.array(tool.rotation_w))
 
     def place(self, points_t: Array) -> Array:
         """Turn (n, 3) tool points into world points [m]."""
@@ -69,9 +61,7 @@ def turned(rotation: Array, turn: Array, share: float) -> Array:
 
 
 @kernel
-def _interpolate(
-    position: Array, travel: Array, rotation: Array, turn: Array, steps: int
-) -> tuple[Array, Array]:
+def _interpolate(position: Array, travel: Array, rotation: Array, turn: Array, steps: int) -> tuple[Array, Array]:
     """Return positions (steps + 1, 3) and rotations (steps + 1, 3, 3) along a straight line with a constant turn."""
     positions, rotations = np.zeros((steps + 1, 3)), np.zeros((steps + 1, 3, 3))
     for k in range(steps + 1):
@@ -87,17 +77,13 @@ def path(before: Pose, now: Pose, steps: int) -> tuple[Array, Array, Array]:
         Positions (steps + 1, 3) [m], rotations (steps + 1, 3, 3), and the rotation vector (3,) in the world [rad].
     """
     turn = _rotation_vector(before.rotation.T @ now.rotation)
-    positions, rotations = _interpolate(
-        before.position, now.position - before.position, before.rotation, turn, steps
-    )
+    positions, rotations = _interpolate(before.position, now.position - before.position, before.rotation, turn, steps)
     return positions, rotations, before.rotation @ turn
 
 
 def _rotation_vector(rotation: Array) -> Array:
     """Return axis times angle of a rotation by less than pi."""
-    skew = np.array(
-        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
-    )
+    skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     sine = 0.5 * float(np.linalg.norm(skew))
     angle = math.atan2(sine, 0.5 * (float(np.trace(rotation)) - 1.0))
     return skew * (0.5 * angle / sine) if sine > 1e-12 else 0.5 * skew

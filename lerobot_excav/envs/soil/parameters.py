@@ -2,25 +2,32 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from lerobot_excav.errors import require
 
-GRAVITY_M_S2 = 9.81
-"""Standard gravity, rounded as the references round it."""
 
+class Origin(NamedTuple):
+    """Where a number comes from, and what it may be.
 
-@dataclass(frozen=True, kw_only=True)
-class Provenance:
-    """Where a number comes from: its unit, its source and its kind (paper, datasheet, derived, tuned, guess)."""
+    Attributes:
+        unit: Its unit.
+        low: Least allowed value.
+        high: Greatest allowed value.
+        kind: `paper`, `datasheet`, `derived`, `tuned` or `guess`.
+        source: Document or reasoning.
+    """
 
     unit: str
-    source: str
+    low: float
+    high: float
     kind: str
+    source: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class SoilParameters:
-    """Bulk properties of one soil; `PROVENANCE` has the source of each.
+    """Bulk properties of one soil; `ORIGINS` has source and range of each.
 
     Attributes:
         density_kg_m3: Bulk density, on the ground as in the air.
@@ -49,11 +56,11 @@ class SoilParameters:
     penetration_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, low, high in _ALLOWED:
+        for name, origin in ORIGINS.items():
             value = getattr(self, name)
             require(
-                math.isfinite(value) and low <= value <= high,
-                f"soil {name}={value!r} is out of range; allowed: {low} to {high}.",
+                math.isfinite(value) and origin.low <= value <= origin.high,
+                f"soil {name}={value!r} is out of range; allowed: {origin.low} to {origin.high}.",
             )
 
     @property
@@ -67,44 +74,22 @@ class SoilParameters:
         return self.density_kg_m3 * sphere_m3 / self.parcel_solid_fraction / self.swell
 
 
-_ALLOWED = (
-    ("density_kg_m3", 100.0, 5000.0),
-    ("friction_angle_rad", 0.05, 1.2),
-    ("cohesion_pa", 0.0, 1e5),
-    ("swell", 1.0, 2.0),
-    ("steel_friction_angle_rad", 0.0, 1.2),
-    ("parcel_solid_fraction", 0.3, 1.0),
-    ("parcel_sliding_scale", 0.0, 10.0),
-    ("parcel_rolling_scale", 0.0, 10.0),
-    ("ground_sliding_scale", 0.0, 10.0),
-    ("ground_rolling_scale", 0.0, 10.0),
-    ("penetration_scale", 0.0, 100.0),
-)
-
 _AGX = "Algoryx AGX Terrain material presets (AGXUnreal assets, Apache-2.0), values re-typed"
 
-PROVENANCE = {
-    "density_kg_m3": Provenance(unit="kg/m3", source=_AGX, kind="paper"),
-    "friction_angle_rad": Provenance(unit="rad", source=_AGX, kind="paper"),
-    "cohesion_pa": Provenance(unit="Pa", source=_AGX, kind="paper"),
-    "swell": Provenance(unit="1", source=_AGX, kind="paper"),
-    "steel_friction_angle_rad": Provenance(
-        unit="rad", source="2/3 of the friction angle, McKyes 1985", kind="derived"
-    ),
-    "parcel_solid_fraction": Provenance(
-        unit="1", source="parcels poured gently into a bucket pack to 0.56", kind="tuned"
-    ),
-    "parcel_sliding_scale": Provenance(
-        unit="1", source="0.5 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
-    ),
-    "parcel_rolling_scale": Provenance(
-        unit="1", source="0.3 for sand, usual in DEM; T1 hardly depends on it", kind="guess"
-    ),
-    "ground_sliding_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "ground_rolling_scale": Provenance(unit="1", source="column collapse and heap (T1, T3)", kind="tuned"),
-    "penetration_scale": Provenance(unit="1", source="bearing theory as it is", kind="guess"),
+ORIGINS = {
+    "density_kg_m3": Origin("kg/m3", 100.0, 5000.0, "paper", _AGX),
+    "friction_angle_rad": Origin("rad", 0.05, 1.2, "paper", _AGX),
+    "cohesion_pa": Origin("Pa", 0.0, 1e5, "paper", _AGX),
+    "swell": Origin("1", 1.0, 2.0, "paper", _AGX),
+    "steel_friction_angle_rad": Origin("rad", 0.0, 1.2, "derived", "2/3 of the friction angle, McKyes 1985"),
+    "parcel_solid_fraction": Origin("1", 0.3, 1.0, "tuned", "parcels poured gently into a bucket pack to 0.56"),
+    "parcel_sliding_scale": Origin("1", 0.0, 10.0, "guess", "0.5 for sand, usual in DEM; T1 hardly depends on it"),
+    "parcel_rolling_scale": Origin("1", 0.0, 10.0, "guess", "0.3 for sand, usual in DEM; T1 hardly depends on it"),
+    "ground_sliding_scale": Origin("1", 0.0, 10.0, "tuned", "column collapse and heap (T1, T3)"),
+    "ground_rolling_scale": Origin("1", 0.0, 10.0, "tuned", "column collapse and heap (T1, T3)"),
+    "penetration_scale": Origin("1", 0.0, 100.0, "guess", "bearing theory as it is"),
 }
-"""Source of each field of `SoilParameters`."""
+"""Source and range of each field of `SoilParameters`."""
 
 
 def _preset(density: float, friction_deg: float, cohesion: float, swell: float) -> SoilParameters:

@@ -60,9 +60,7 @@ class Patches:
         return cls.alike(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), 0.0, PatchKind.WEDGE)
 
     @classmethod
-    def alike(
-        cls, points_w: Array, normals_w: Array, limits_n: Array, friction: float, kind: PatchKind
-    ) -> "Patches":
+    def alike(cls, points_w: Array, normals_w: Array, limits_n: Array, friction: float, kind: PatchKind) -> "Patches":
         """Return patches of one kind and one friction coefficient; those without a limit above zero are left out."""
         holds = limits_n > 0.0
         count = int(holds.sum())
@@ -105,9 +103,7 @@ class Patches:
             kinds=self.kinds[chosen],
         )
 
-    def wrench(
-        self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array
-    ) -> tuple[Array, Array]:
+    def wrench(self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array) -> tuple[Array, Array]:
         """Return force [N] and torque about the origin [N m] on a tool that moves on unhindered, both (3,).
 
         Every push and every friction force is full from a share `FULL_SHARE` of the speed on, and in between

@@ -20,7 +20,7 @@ from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.tool import Tool
-from lerobot_excav.envs.soil.wedge import SoilNumbers, table_row
+from lerobot_excav.envs.soil.wedge import SoilStrength, table_row
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) ->
     """
     overlaps = np.zeros(len(points))
     for k in range(len(points)):
-        x, y = points[k, 0] + grid[2] * normals[k, 0], points[k, 1] + grid[2] * normals[k, 1]
+        x, y = points[k, 0] + grid.dx * normals[k, 0], points[k, 1] + grid.dx * normals[k, 1]
         if in_grid(heights, grid, x, y):
             overlaps[k] = max(0.0, surface_height(heights, grid, x, y) - points[k, 2])
     return overlaps
@@ -91,7 +91,7 @@ def plate_limits(
     normals: Array,
     areas: Array,
     breadths: Array,
-    soil: SoilNumbers,
+    soil: SoilStrength,
     table: Array,
 ) -> Array:
     """Return the greatest push [N] of the soil on each sample of the outer faces.
@@ -103,7 +103,7 @@ def plate_limits(
         normals: (m, 3) unit vectors out of the bucket.
         areas: (m,) [m2].
         breadths: (m,) shares of the breadth of the footing [m].
-        soil: Numbers of the soil.
+        soil: What the soil can bear.
         table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
     limits = np.zeros(len(overlaps))
@@ -113,8 +113,13 @@ def plate_limits(
         if overlaps[k] > 0.0:
             upright = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
             _, cohesion, surcharge = table_row(table, math.atan2(upright, normals[k, 2]))
-            passive = (soil[0] * overlaps[k] * surcharge + soil[3] * cohesion) * math.cos(soil[2])
-            capacity = soil[0] * (overlaps[k] * soil[5] + 0.5 * footing * soil[6]) + soil[3] * soil[4]
+            passive = (soil.unit_weight * overlaps[k] * surcharge + soil.cohesion * cohesion) * math.cos(
+                soil.steel_friction
+            )
+            capacity = (
+                soil.unit_weight * (overlaps[k] * soil.bearing_depth + 0.5 * footing * soil.bearing_width)
+                + soil.cohesion * soil.bearing_cohesion
+            )
             bearing = factors[k] * min(SINKAGE_MODULUS * sinkages[k] ** SINKAGE_EXPONENT, capacity)
             downward = max(0.0, -normals[k, 2]) ** 2
             limits[k] = areas[k] * contacts[k] * (passive + downward * (bearing - passive))
@@ -126,18 +131,18 @@ class PlatePressure:
 
     Args:
         faces: Samples of its outer faces.
-        soil: Numbers of the soil.
+        soil: What the soil can bear.
         table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
 
-    def __init__(self, faces: OuterFaces, soil: SoilNumbers, table: Array) -> None:
+    def __init__(self, faces: OuterFaces, soil: SoilStrength, table: Array) -> None:
         self._faces = faces
         self._soil = soil
         self._table = table
         self._sinkages: Array = np.zeros(len(faces.areas_m2))
 
     def patches(self, heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, dt_s: float) -> Patches:
-        """Return what the ground can hold against the plates; arguments as in `DiggingResistance.react`."""
+        """Return what the ground can hold against the plates; arguments as in `SoilResistance.react`."""
         faces = self._faces
         arms = faces.points_t @ tool.rotation_w.T
         normals = faces.normals_t @ tool.rotation_w.T
@@ -157,4 +162,4 @@ class PlatePressure:
             self._soil,
             self._table,
         )
-        return Patches.alike(points, -normals, limits, math.tan(self._soil[2]), PatchKind.PRESSURE)
+        return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

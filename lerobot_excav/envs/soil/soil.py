@@ -5,13 +5,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.bucket import Bucket
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
-from lerobot_excav.envs.soil.forces import DiggingResistance
+from lerobot_excav.envs.soil.forces import SoilResistance
 from lerobot_excav.envs.soil.height_field import HeightField
-from lerobot_excav.envs.soil.loose import TICK_S, LooseSoil
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, PRESETS, SoilParameters
+from lerobot_excav.envs.soil.loose import LooseSoil
+from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.tool import Reaction, Tool
 from lerobot_excav.errors import require, require_choice
 
@@ -68,9 +69,7 @@ class Soil:
             preset = PRESETS[preset]
         require_choice("fidelity", fidelity, tuple(FIDELITIES))
         require(len(extent_m) == 2, f"extent_m={extent_m!r}; allowed: two lengths, along x and y.")
-        require(
-            0.0 <= floor_depth_m < math.inf, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above, finite."
-        )
+        require(0.0 <= floor_depth_m < math.inf, f"floor_depth_m={floor_depth_m!r}; allowed: 0 and above, finite.")
         require(seed >= 0, f"seed={seed!r}; allowed: 0 and above.")
         require(
             container is None or not container.overlaps(extent_m),
@@ -91,7 +90,7 @@ class Soil:
         self._loose = LooseSoil(
             self.parameters, self.fidelity, self._field, self._box_field, container, self.floor_depth_m
         )
-        self._resistance = DiggingResistance(self.parameters, self.fidelity.force_slices)
+        self._resistance = SoilResistance(self.parameters, self.fidelity.force_slices)
         self.reset()
 
     def reset(self, heights_m: ArrayLike | None = None) -> None:
@@ -136,7 +135,7 @@ class Soil:
         masses = np.full(len(positions), self.parcel_mass_kg)
         self._loose.population.add(positions, velocities, masses)
 
-    def step(self, dt_s: float = 0.02, tool: Tool | None = None) -> Reaction:
+    def step(self, dt_s: float = TICK_S, tool: Tool | None = None) -> Reaction:
         """Advance by one step.
 
         Args:
@@ -161,9 +160,7 @@ class Soil:
             self._out_of_bounds_m3 += lost
             self._give_birth(is_last=entered == 0.0 and load_m3 == 0.0)
         geometry = None if tool is None else tool.geometry
-        self._out_of_bounds_kg += self._loose.step(
-            geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0
-        )
+        self._out_of_bounds_kg += self._loose.step(geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0)
         sweeps = max(1, round(self.fidelity.sweeps_per_tick * dt_s / TICK_S))
         for field in (self._field, self._box_field):
             self._out_of_bounds_m3 += field.relax(sweeps, self.parameters.slope_tan)

@@ -18,9 +18,7 @@ def _fixed(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return a read-only float64 copy of the right shape with finite values."""
     array = np.array(value, dtype=np.float64)
     require(array.shape == shape, f"{name} has shape {array.shape}; allowed: {shape}.")
-    require(
-        bool(np.isfinite(array).all()), f"{name}={array.tolist()} is not finite; check the machine's state."
-    )
+    require(bool(np.isfinite(array).all()), f"{name}={array.tolist()} is not finite; check the machine's state.")
     array.flags.writeable = False
     return array
 

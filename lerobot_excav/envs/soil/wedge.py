@@ -4,6 +4,7 @@ The wedge is weighed in the height field, so heaps and slopes ahead of the bucke
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,6 @@ from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 
 Array = NDArray[np.float64]
-SoilNumbers = tuple[float, float, float, float, float, float, float, float]
-"""Unit weight, friction, soil-steel friction, cohesion, bearing factors of cohesion, depth and width, scale."""
 
 EDGE_THICKNESS_M = 0.02
 """Thickness of the cutting edge (guess, typical of 8-t buckets)."""
@@ -32,6 +31,30 @@ _WEDGE_REACH_M = 4.0
 """Longest failure plane followed through the height field."""
 
 
+class SoilStrength(NamedTuple):
+    """What the force model knows of a soil.
+
+    Attributes:
+        unit_weight: Weight of a volume [N/m3].
+        friction: Friction angle [rad].
+        steel_friction: Angle of friction between soil and steel [rad].
+        cohesion: Cohesion [Pa].
+        bearing_cohesion: Bearing factor of the cohesion [1].
+        bearing_depth: Bearing factor of the depth [1].
+        bearing_width: Bearing factor of the width [1].
+        penetration_scale: Factor on the bearing of the cutting edge [1].
+    """
+
+    unit_weight: float
+    friction: float
+    steel_friction: float
+    cohesion: float
+    bearing_cohesion: float
+    bearing_depth: float
+    bearing_width: float
+    penetration_scale: float
+
+
 @kernel
 def wedge_area(
     heights: Array, grid: Grid, edge: tuple[float, float, float], ahead: tuple[float, float], failure: float
@@ -40,14 +63,12 @@ def wedge_area(
 
     The surface within one cell of the edge is read one cell ahead: nearer, the bucket has taken it already.
     """
-    step = 0.5 * grid[2]
+    step = 0.5 * grid.dx
     area, reach = 0.0, 0.0
-    thickness = (
-        surface_height(heights, grid, edge[0] + ahead[0] * grid[2], edge[1] + ahead[1] * grid[2]) - edge[2]
-    )
+    thickness = surface_height(heights, grid, edge[0] + ahead[0] * grid.dx, edge[1] + ahead[1] * grid.dx) - edge[2]
     while thickness > 0.0 and reach < _WEDGE_REACH_M:
         reach += step
-        level = max(reach, grid[2])
+        level = max(reach, grid.dx)
         x, y = edge[0] + ahead[0] * level, edge[1] + ahead[1] * level
         following = surface_height(heights, grid, x, y) - edge[2] - reach * math.tan(failure)
         if following > 0.0:
@@ -82,7 +103,7 @@ def wedge_force(
     rake: float,
     ahead: tuple[float, float],
     width: float,
-    soil: SoilNumbers,
+    soil: SoilStrength,
     table: Array,
 ) -> float:
     """Return the force [N] at which the soil before one slice of the edge fails; formula in `earthmoving`.
@@ -93,18 +114,20 @@ def wedge_force(
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
     failure, cohesion_factor, _ = table_row(table, rake)
     area = wedge_area(weighed, grid, edge, ahead, failure) + 0.5 * depth**2 / math.tan(rake)
-    balance = math.sin(failure + soil[1]) / math.sin(rake + soil[2] + failure + soil[1])
-    return float(soil[0] * area * width * balance + soil[3] * depth * width * cohesion_factor)
+    balance = math.sin(failure + soil.friction) / math.sin(rake + soil.steel_friction + failure + soil.friction)
+    return float(soil.unit_weight * area * width * balance + soil.cohesion * depth * width * cohesion_factor)
 
 
 @kernel
-def edge_bearing(depth: float, width: float, soil: SoilNumbers) -> float:
+def edge_bearing(depth: float, width: float, soil: SoilStrength) -> float:
     """Return the force [N] at which the ground yields to edge and teeth, without its cap."""
-    stress = soil[0] * depth * soil[5]
+    stress = soil.unit_weight * depth * soil.bearing_depth
     entry = min(1.0, depth / EDGE_THICKNESS_M)
-    stress += entry * (soil[3] * soil[4] + 0.5 * soil[0] * EDGE_THICKNESS_M * soil[6])
+    stress += entry * (
+        soil.cohesion * soil.bearing_cohesion + 0.5 * soil.unit_weight * EDGE_THICKNESS_M * soil.bearing_width
+    )
     ramp = 0.1 + 0.9 * min(1.0, depth / FULL_PENETRATION_DEPTH_M)
-    return soil[7] * stress * ramp * (EDGE_THICKNESS_M + TEETH_AREA_PER_WIDTH_M) * width
+    return soil.penetration_scale * stress * ramp * (EDGE_THICKNESS_M + TEETH_AREA_PER_WIDTH_M) * width
 
 
 @kernel
@@ -116,7 +139,7 @@ def edge_limits(
     rake: float,
     ahead: tuple[float, float],
     width: float,
-    soil: SoilNumbers,
+    soil: SoilStrength,
     table: Array,
 ) -> tuple[Array, Array]:
     """Return the forces [N] at which soil fails before each slice of the edge, and at which it yields to the slice.
@@ -129,7 +152,7 @@ def edge_limits(
         rake: Angle of the plate from the horizontal [rad].
         ahead: Level unit direction in which soil lies before the edge.
         width: Width of the whole edge [m].
-        soil: Numbers of the soil.
+        soil: What the soil can bear.
         table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
     count = len(edges)
@@ -138,7 +161,7 @@ def edge_limits(
         edge = (edges[k, 0], edges[k, 1], edges[k, 2])
         if not in_grid(heights, grid, edge[0], edge[1]):
             continue
-        x, y = edge[0] + ahead[0] * grid[2], edge[1] + ahead[1] * grid[2]
+        x, y = edge[0] + ahead[0] * grid.dx, edge[1] + ahead[1] * grid.dx
         depth = surface_height(heights, grid, x, y) - edge[2]
         if depth > 0.0:
             share = width / count

@@ -32,8 +32,8 @@ MASK_MISSING_LIMIT_S = 10.0
 class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[Any]]):
     """A machine in a scene, and a target that a mask of the main view commands.
 
-    A task is a subclass that says how a scene begins, how a frame passes, what the targets are and what is measured; the
-    rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
+    A task is a subclass that says how a scene begins, how a frame passes, what the targets are and what is measured.
+    The rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
 
     `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`; `reset(options={"scene_id": …, "target_id": …,
     "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, and without `commands`
@@ -218,9 +218,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
             ConfigurationError: An option is unknown or has a value that is not possible.
         """
         super().reset(seed=seed)
-        selection = select_episode(
-            seed, options or {}, rng=self.np_random, target_count=self.task_spec.target_count
-        )
+        selection = select_episode(seed, options or {}, rng=self.np_random, target_count=self.task_spec.target_count)
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
@@ -306,10 +304,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
     def _change_command(self) -> None:
         """Give the next command if it is time for one."""
         schedule = self._require_episode().schedule
-        if schedule is None:
-            target_id = self._next_target()
-        else:
-            target_id = dict(schedule).get(self._frame)
+        target_id = self._next_target() if schedule is None else dict(schedule).get(self._frame)
         if target_id is not None:
             self._begin_command(target_id)
             self._give_command(target_id)
@@ -350,8 +345,9 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         if camera != "main":
             return self.renderer.render(camera)
         picture = self.picture()
-        overlay = self.settings.target_overlay and self._mask is not None
-        return tinted(picture, self._mask.pixels) if overlay else picture
+        if not self.settings.target_overlay or self._mask is None:
+            return picture
+        return tinted(picture, self._mask.pixels)
 
     def _info(self, *, is_over: bool) -> dict[str, Any]:
         info = {

@@ -51,10 +51,12 @@ class EpisodeRecord(BaseModel):
         mask_condition: Which mask was shown.
         mask_noise: How it was disturbed.
         mask_noise_px: By how much [px].
+        shown_target_id: Target that the last mask showed, noise aside; -1 if it showed none.
         target_overlay: Whether the mask was tinted into the main picture.
         is_success: Whether every part of the task succeeded.
         frames: Length of the episode.
-        mask_missing_frames: Frames without a mask, because the source found nothing.
+        mask_missing: Whether the episode was given up because the source found nothing.
+        mask_missing_frames: Frames in which the machine was held still, because the source had found nothing yet.
         commands: All commands, in their order; the first begins at frame 0.
     """
 
@@ -70,8 +72,10 @@ class EpisodeRecord(BaseModel):
     mask_noise: str
     mask_noise_px: int
     target_overlay: bool
+    shown_target_id: int
     is_success: bool
     frames: int
+    mask_missing: bool
     mask_missing_frames: int
     commands: tuple[CommandedTarget, ...]
 

@@ -21,9 +21,7 @@ def observation_space(
         cameras: Names of the pictures, each (H, W, 3) uint8.
         state_size: Length of `agent_pos`, float32.
     """
-    spaces: dict[str, gym.Space[Any]] = {
-        "agent_pos": gym.spaces.Box(-np.inf, np.inf, (state_size,), np.float32)
-    }
+    spaces: dict[str, gym.Space[Any]] = {"agent_pos": gym.spaces.Box(-np.inf, np.inf, (state_size,), np.float32)}
     if obs_type == "pixels_agent_pos":
         image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
         spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(cameras, image))

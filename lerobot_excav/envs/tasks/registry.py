@@ -31,7 +31,7 @@ def register_task(spec: TaskSpec) -> None:
 
 
 def load_plugins() -> None:
-    """Import what installed packages name as entry points of the group `lerobot_excav.plugins`; each registers its tasks."""
+    """Import what other packages name as entry points of the group `lerobot_excav.plugins`: they register their tasks."""
     for entry_point in entry_points(group="lerobot_excav.plugins"):
         entry_point.load()
 

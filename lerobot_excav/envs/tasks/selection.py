@@ -67,9 +67,7 @@ def checked_schedule(commands: Sequence[Sequence[int]], target_count: int) -> Sc
     for change in commands:
         require(len(change) == 2, f"commands={commands!r}: {change!r} is not a pair of frame and target")
         frame, target_id = change
-        require_integer(
-            "commands: frame", frame, last + 1, hint="Frames are numbered from the start and rise."
-        )
+        require_integer("commands: frame", frame, last + 1, hint="Frames are numbered from the start and rise.")
         require_integer("commands: target_id", target_id, 0, target_count - 1)
         last = frame
     return tuple((int(frame), int(target_id)) for frame, target_id in commands)

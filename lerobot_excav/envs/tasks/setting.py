@@ -109,9 +109,7 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
     if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
         names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
         wanted = allowed.words if allowed.values is not None else f"{' or '.join(names)} {allowed.words}"
-        raise ConfigurationError(
-            f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip()
-        )
+        raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip())
 
 
 def _is_of(value: Any, kind: Any) -> bool:

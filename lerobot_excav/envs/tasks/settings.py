@@ -66,8 +66,7 @@ class TaskSettings:
         check_settings(self, self.PREFIX)
         self._check_mask()
         # A configuration of LeRobot stands behind the settings.
-        if hasattr(super(), "__post_init__"):
-            super().__post_init__()
+        getattr(super(), "__post_init__", lambda: None)()
 
     def _check_mask(self) -> None:
         """Raise unless condition, kind and size of the mask's noise belong together."""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE, TaskSettings
 
 if TYPE_CHECKING:
-    from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
     from lerobot_excav.envs.tasks.measures import TaskMeasures
 
 
@@ -100,10 +99,9 @@ class TaskSpec:
         """Make settings of this task; those left out have their defaults."""
         return self.settings.of({"task": self.id, **values})
 
-    def make_env(self, **arguments: Any) -> "MaskedTaskEnv[Any, Any]":
-        """Make the environment; see `MaskedTaskEnv` for the arguments."""
-        env: MaskedTaskEnv[Any, Any] = resolve_name(self.env_entry)(**{"task": self.id, **arguments})
-        return env
+    def make_env(self, **arguments: Any) -> Any:
+        """Make the environment, a `MaskedTaskEnv`; see there for the arguments."""
+        return resolve_name(self.env_entry)(**{"task": self.id, **arguments})
 
     def make_operator(self, rng: np.random.Generator) -> Operator:
         """Make a scripted operator, whose style is drawn from `rng`."""

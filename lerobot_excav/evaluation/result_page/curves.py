@@ -94,9 +94,7 @@ def _point(step: int, metrics: Path) -> CurvePoint:
     run = Run(label=str(metrics), evaluations=(read_evaluation(metrics),))
     sets = sorted({episode.scene_set for episode in run.episodes})
     if len(sets) > 1:
-        raise DatasetError(
-            f"{metrics} mixes scenes of {' and '.join(sets)}; a point of a curve is of one set"
-        )
+        raise DatasetError(f"{metrics} mixes scenes of {' and '.join(sets)}; a point of a curve is of one set")
     return CurvePoint(
         step=step,
         run=run,

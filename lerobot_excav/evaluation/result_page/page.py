@@ -25,15 +25,18 @@ class PageRow:
 
     Attributes:
         row: What the page says of it.
-        run: The episodes.
-        summary: The measures.
+        summary: The episodes and their measures.
         origin: Command, code and training.
     """
 
     row: Row
-    run: Run
     summary: RunSummary
     origin: EvaluationOrigin
+
+    @property
+    def run(self) -> Run:
+        """The episodes."""
+        return self.summary.run
 
     @property
     def metrics(self) -> Path:
@@ -177,7 +180,7 @@ def _is_run(contents: Contents, row: Row) -> bool:
 def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
     path = contents.metrics_path(row.label)
     run = Run(label=row.label, evaluations=(read_evaluation(path),))
-    return PageRow(row=row, run=run, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
+    return PageRow(row=row, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
 
 
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
@@ -191,9 +194,7 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
         section=section,
         rows=present,
         missing=[row.label for row in section.rows if row.label not in rows],
-        differences=[
-            _difference(reference.run, row.run, rng) for row in present if reference and row is not reference
-        ],
+        differences=[_difference(reference.run, row.run, rng) for row in present if reference and row is not reference],
     )
 
 
@@ -211,6 +212,4 @@ def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDiffe
     """Compare on common scenes: a row may have played fewer of them than its reference."""
     common = set(reference.keys) & set(run.keys)
     differences = compare(reference.only(common), run.only(common), rng) if common else []
-    return PageDifference(
-        label=run.label, reference=reference.label, scenes=len(common), differences=differences
-    )
+    return PageDifference(label=run.label, reference=reference.label, scenes=len(common), differences=differences)

@@ -44,7 +44,7 @@ def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Cl
         training_rows=[_training(training) for training in page.trainings],
         seed=page.bootstrap_seed,
         measures=_legend(page),
-        simulations=simulations([row.summary for row in page.rows]) if page.rows else "",
+        simulations=simulations([row.run for row in page.rows]) if page.rows else "",
         versions=_versions(page),
         commands=_commands(page),
         by_hand=_by_hand(page),
@@ -69,7 +69,7 @@ def _tables(section: PageSection) -> Iterator[str]:
 
 def _table(rows: Sequence[PageRow], columns: Sequence[tuple[str, list[str]]]) -> str:
     """Lay out columns, each with its header, behind the names of the rows."""
-    names = [[row.row.about, *row.run.setting.values(), str(row.summary.episodes)] for row in rows]
+    names = [[row.row.about, *row.run.setting.values(), str(len(row.run.episodes))] for row in rows]
     values = zip(*(cells for _, cells in columns), strict=True)
     header = ["setting", *rows[0].run.setting, "n", *(header for header, _ in columns)]
     return markdown_table(header, [[*name, *cells] for name, cells in zip(names, values, strict=True)])
@@ -179,6 +179,4 @@ def _heading(row: PageRow) -> str:
 def _by_hand(page: ResultPage) -> list[str]:
     """Name what has no known command."""
     trainings = [f"training {training.name}" for training in page.trainings if not training.command]
-    return trainings + [
-        f"{row.row.label} (seed {_number(row.seed)})" for row in page.rows if not row.origin.command
-    ]
+    return trainings + [f"{row.row.label} (seed {_number(row.seed)})" for row in page.rows if not row.origin.command]

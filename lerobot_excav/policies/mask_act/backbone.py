@@ -61,9 +61,7 @@ def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
     width_in = SMALL_STEM_WIDTH
     for width, stride in SMALL_STAGES:
         same = width == width_in and stride == 1
-        shortcut = (
-            None if same else nn.Sequential(nn.Conv2d(width_in, width, 1, stride, bias=False), norm(width))
-        )
+        shortcut = None if same else nn.Sequential(nn.Conv2d(width_in, width, 1, stride, bias=False), norm(width))
         layers.append(BasicBlock(width_in, width, stride=stride, downsample=shortcut, norm_layer=norm))
         width_in = width
     return nn.Sequential(*layers)

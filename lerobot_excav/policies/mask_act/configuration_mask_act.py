@@ -180,9 +180,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 not that of the main camera.
         """
         cameras = self.camera_keys
-        require(
-            bool(cameras), f"mask_act needs a camera; its image features are {sorted(self.image_features)}."
-        )
+        require(bool(cameras), f"mask_act needs a camera; its image features are {sorted(self.image_features)}.")
         require(
             self.main_camera_key != self.mask_key,
             f"main_camera={self.main_camera!r} is the mask itself (mask_key); allowed: {', '.join(cameras)}.",
@@ -237,9 +235,7 @@ MISSING_MASK_HINT = (
 )
 
 
-def require_mask_shape(
-    mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]
-) -> None:
+def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]) -> None:
     """Raise `ConfigurationError` unless the shape of a mask fits its camera: ([B,] 1 or 3, H, W) to ([B,] 3, H, W)."""
     *batch, _, height, width = main_shape
     allowed = [(*batch, channels, height, width) for channels in (1, 3)]

@@ -40,9 +40,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
             weight beyond half precision.
     """
     require_checkpoint(checkpoint)
-    require(
-        checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder."
-    )
+    require(checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder.")
     policy = MaskACTPolicy.from_pretrained(checkpoint)
     weights = run_time_weights(policy)
     config = copy.copy(policy.config)
@@ -83,9 +81,7 @@ def run_time_weights(policy: MaskACTPolicy) -> dict[str, Tensor]:
 
 def parameter_count(policy: MaskACTPolicy) -> int:
     """Return the number of parameters that acting needs."""
-    return sum(
-        value.numel() for name, value in policy.named_parameters() if not name.startswith(TRAINING_ONLY)
-    )
+    return sum(value.numel() for name, value in policy.named_parameters() if not name.startswith(TRAINING_ONLY))
 
 
 def require_checkpoint(checkpoint: Path) -> None:

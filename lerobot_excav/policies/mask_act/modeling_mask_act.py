@@ -145,9 +145,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
             self._queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
         return self._queue.pop()
 
-    def _run(
-        self, batch: Batch, mask: Tensor, demonstration: Demonstration | None
-    ) -> tuple[Tensor, Latent | None]:
+    def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
         plan: tuple[Tensor, Latent | None] = self.model(
             masked_views(self.config, batch, mask),
             mask,

@@ -6,9 +6,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-TEMPERATURE = (
-    10000  # ratio of the lowest to the highest frequency, as in LeRobot's ACTSinusoidalPositionEmbedding2d
-)
+TEMPERATURE = 10000  # ratio of the lowest to the highest frequency, as in LeRobot's ACTSinusoidalPositionEmbedding2d
 
 
 class TargetToken(nn.Module):
@@ -96,9 +94,7 @@ def axis_encodings(cell_count: int, pixel_count: int, dim: int) -> Tensor:
     Returns:
         Encodings, shape (pixel_count, dim).
     """
-    cell = (torch.arange(pixel_count) + 0.5) * (
-        cell_count / pixel_count
-    ) + 0.5  # pixel centres; first cell at 1
+    cell = (torch.arange(pixel_count) + 0.5) * (cell_count / pixel_count) + 0.5  # pixel centres; first cell at 1
     frequency = TEMPERATURE ** (-2 * torch.arange(dim // 2) / dim)
     angle = 2 * math.pi / cell_count * cell[:, None] * frequency  # (pixel_count, dim / 2)
     return torch.stack([angle.sin(), angle.cos()], dim=-1).flatten(1)

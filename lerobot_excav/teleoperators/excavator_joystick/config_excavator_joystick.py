@@ -56,8 +56,7 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
         require_choice("teleop.pattern", self.pattern, tuple(PATTERNS))
         require(
             0.0 <= self.dead_zone < 1.0,
-            f"teleop.dead_zone={self.dead_zone} is not possible; "
-            "allowed: from 0 to below 1, usually 0.05 to 0.1.",
+            f"teleop.dead_zone={self.dead_zone} is not possible; allowed: from 0 to below 1, usually 0.05 to 0.1.",
         )
         require(0.0 <= self.expo <= 1.0, f"teleop.expo={self.expo} is not possible; allowed: from 0 to 1.")
         for axis in self.invert:

@@ -24,9 +24,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
     name = "excavator_joystick"
     action_names = ACTION_NAMES
 
-    def __init__(
-        self, config: ExcavatorJoystickConfig, *, open_device: Callable[..., Gamepad] = open_gamepad
-    ) -> None:
+    def __init__(self, config: ExcavatorJoystickConfig, *, open_device: Callable[..., Gamepad] = open_gamepad) -> None:
         super().__init__(config)
         self.config = config
         self._open_device = open_device
@@ -49,9 +47,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
             DeviceError: The device is missing, unknown to SDL and not numbered, or open already.
         """
         if self._device is not None:
-            raise DeviceError(
-                f"the gamepad {self._device.name!r} is connected already; call disconnect() first."
-            )
+            raise DeviceError(f"the gamepad {self._device.name!r} is connected already; call disconnect() first.")
         self._device = self._open_device(
             index=self.config.device_index,
             name=self.config.device_name,

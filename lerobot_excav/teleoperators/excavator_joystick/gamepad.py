@@ -74,9 +74,7 @@ class PlainJoystick:
         DeviceError: The device has fewer axes or buttons than the configuration numbers.
     """
 
-    def __init__(
-        self, pygame: Any, joystick: Any, axes: Mapping[str, int], buttons: Mapping[str, int]
-    ) -> None:
+    def __init__(self, pygame: Any, joystick: Any, axes: Mapping[str, int], buttons: Mapping[str, int]) -> None:
         self.name = str(joystick.get_name())
         self._pygame, self._joystick, self._axes, self._buttons = pygame, joystick, axes, buttons
         self._instance_id = joystick.get_instance_id()
@@ -86,9 +84,7 @@ class PlainJoystick:
         ):
             beyond = {name: number for name, number in numbers.items() if number >= count}
             if beyond:
-                raise DeviceError(
-                    f"teleop.{field}: {beyond} do not exist; {self.name!r} has {count}, from 0."
-                )
+                raise DeviceError(f"teleop.{field}: {beyond} do not exist; {self.name!r} has {count}, from 0.")
 
     def read(self) -> tuple[dict[str, float], dict[str, bool]]:
         """Return axes and buttons; see `Gamepad.read`."""

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature, split_dataset
-
-from lerobot_excav.datasets.check.quality_check import check_dataset
-from lerobot_excav.datasets.check.version_check import require_one_version, versions_of
-from lerobot_excav.datasets.format.schema import unmarked_columns
-from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
-from lerobot_excav.datasets.record import partial_run
 from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 from lerobot_excav.envs.tasks.scoop.simulation_version import CHANGES, SIMULATION_VERSION, UNMARKED_VERSION
+
+from lerobot_excav.datasets.check.quality_check import check_dataset
+from lerobot_excav.datasets.format.schema import unmarked_columns
+from lerobot_excav.datasets.format.version_check import require_one_version, versions_of
+from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
+from lerobot_excav.datasets.record import partial_run
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.scripts.main import main
 

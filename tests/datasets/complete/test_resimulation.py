@@ -5,15 +5,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
+from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
+from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 
 from lerobot_excav.datasets.complete import resimulation
 from lerobot_excav.datasets.complete.resimulation import complete_recording
 from lerobot_excav.datasets.format.schema import excav_features
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import INDEX_PATH, build_index, write_index
-from lerobot_excav.datasets.record.environments import ENVIRONMENTS
-from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
-from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
 from lerobot_excav.errors import DatasetError, ExcavError
 
 

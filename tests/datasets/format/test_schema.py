@@ -3,6 +3,8 @@ from lerobot.datasets import aggregate_pipeline_dataset_features, create_initial
 from lerobot.datasets.feature_utils import features_equal_for_merge
 from lerobot.processor import make_default_processors
 from lerobot.utils.feature_utils import combine_feature_dicts
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS, environment_of_robot
+from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.schema import (
@@ -11,8 +13,6 @@ from lerobot_excav.datasets.format.schema import (
     require_columns,
     unmarked_columns,
 )
-from lerobot_excav.datasets.record.environments import ENVIRONMENTS, environment_of_robot
-from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 from lerobot_excav.errors import DatasetError
 
 LOSSLESS = {"video.codec": "h264", "video.crf": 0, "video.pix_fmt": "yuv444p"}

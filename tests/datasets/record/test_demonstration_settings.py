@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.environments import ENVIRONMENTS
 from lerobot_excav.envs.tasks.grasp.nearest_block import nearest_block
 from lerobot_excav.envs.tasks.grasp.scene import draw_scene
 from lerobot_excav.errors import ConfigurationError

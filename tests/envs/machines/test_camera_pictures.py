@@ -30,9 +30,7 @@ FLOOR_ONLY = visible_groups(0)
 def pictures():
     data = mujoco.MjData(MODEL)
     mujoco.mj_forward(MODEL, data)
-    pictures = CameraPictures(
-        MODEL, data, cameras=("above", "aside"), height=HEIGHT, width=WIDTH, max_geoms=10
-    )
+    pictures = CameraPictures(MODEL, data, cameras=("above", "aside"), height=HEIGHT, width=WIDTH, max_geoms=10)
     yield pictures
     pictures.close()
 
@@ -61,9 +59,7 @@ def test_points_are_where_the_pixels_look(pictures):
     points_w = pictures.points_w("above", FLOOR_ONLY)
     assert points_w[..., 2] == pytest.approx(0.0, abs=2e-3)
     px_m = 2.0 * np.tan(np.radians(30.0)) / (HEIGHT / 2)
-    assert points_w[0, 0, :2] == pytest.approx(
-        [(0.5 - WIDTH / 2) * px_m, (HEIGHT / 2 - 0.5) * px_m], abs=1e-3
-    )
+    assert points_w[0, 0, :2] == pytest.approx([(0.5 - WIDTH / 2) * px_m, (HEIGHT / 2 - 0.5) * px_m], abs=1e-3)
 
 
 def test_every_pixel_of_a_geom_lies_on_it(pictures):

@@ -5,34 +5,29 @@ import math
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.soil.benchmark import BUCKET, TICK_S, tool_at
+from bench.soil import BUCKET, tool_at
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil.parcels.load import WAKING_TILT_RAD
 from lerobot_excav.envs.soil.soil import Soil
-from lerobot_excav.envs.soil.tool import Tool
 
 EDGE = np.array([0.0, 0.0, 2.0])
 
 
-def held(pitch_deg: float = 180.0, edge: np.ndarray = EDGE, velocity: np.ndarray | None = None) -> Tool:
+def held(pitch_deg=180.0, edge=EDGE, velocity=None):
     return tool_at(edge, math.radians(pitch_deg), np.zeros(3) if velocity is None else velocity, 0.0)
 
 
-def wait(soil: Soil, tool: Tool | None, ticks: int) -> None:
+def wait(soil, tool, ticks):
     for _ in range(ticks):
         soil.step(TICK_S, tool)
 
 
-def filled(fidelity: str = "fast", count: int = 60) -> Soil:
+def filled(fidelity="fast", count=60):
     """Return a soil with a load asleep in a bucket in the air: parcels rained into it."""
     soil, tool = Soil(fidelity=fidelity), held()
     soil.step(TICK_S, tool)
     lattice = np.array(
-        [
-            (x, y, z)
-            for z in (0.1, -0.1, -0.3, -0.5)
-            for y in (-0.2, 0.0, 0.2)
-            for x in np.linspace(0.4, 0.9, 5)
-        ]
+        [(x, y, z) for z in (0.1, -0.1, -0.3, -0.5) for y in (-0.2, 0.0, 0.2) for x in np.linspace(0.4, 0.9, 5)]
     )
     start = tool.position_w + lattice[:count] @ tool.rotation_w.T
     soil.add_parcels(start, np.zeros_like(start))
@@ -43,12 +38,12 @@ def filled(fidelity: str = "fast", count: int = 60) -> Soil:
     raise AssertionError("the load does not sleep")
 
 
-def places_t(soil: Soil, tool: Tool) -> np.ndarray:
+def places_t(soil, tool):
     return (soil.parcel_positions_w - tool.position_w) @ tool.rotation_w
 
 
 @pytest.mark.parametrize("fidelity", ["fast", "standard", "fine"])
-def test_parcels_that_come_to_rest_in_a_still_bucket_are_a_load_asleep(fidelity: str) -> None:
+def test_parcels_that_come_to_rest_in_a_still_bucket_are_a_load_asleep(fidelity):
     soil = filled(fidelity)
     assert soil.parcel_is_load.all()
     assert soil.awake_parcel_count == 0
@@ -58,7 +53,7 @@ def test_parcels_that_come_to_rest_in_a_still_bucket_are_a_load_asleep(fidelity:
     assert inside[:, 1:].max() < 0.0
 
 
-def test_a_sleeping_load_travels_as_one_body_with_the_velocity_of_the_bucket() -> None:
+def test_a_sleeping_load_travels_as_one_body_with_the_velocity_of_the_bucket():
     soil = filled()
     places = places_t(soil, held())
     edge, velocity = EDGE.copy(), np.zeros(3)
@@ -72,19 +67,17 @@ def test_a_sleeping_load_travels_as_one_body_with_the_velocity_of_the_bucket() -
         np.testing.assert_allclose(soil.parcel_velocities_w, np.tile(velocity, (60, 1)), atol=1e-9)
 
 
-def test_the_payload_has_its_mass_and_centre_in_the_reaction() -> None:
+def test_the_payload_has_its_mass_and_centre_in_the_reaction():
     soil = filled()
     tool = held()
     reaction = soil.step(TICK_S, tool)
     masses = soil.parcel_masses_kg
     assert reaction.payload_mass_kg == pytest.approx(masses.sum())
-    np.testing.assert_allclose(
-        reaction.payload_com_t, masses @ places_t(soil, tool) / masses.sum(), atol=1e-12
-    )
+    np.testing.assert_allclose(reaction.payload_com_t, masses @ places_t(soil, tool) / masses.sum(), atol=1e-12)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_load_wakes_when_it_has_tilted_by_the_waking_angle(sign: float) -> None:
+def test_a_load_wakes_when_it_has_tilted_by_the_waking_angle(sign):
     soil, degrees = filled(), 0.0
     while soil.awake_parcel_count == 0:
         degrees += 0.02
@@ -94,7 +87,7 @@ def test_a_load_wakes_when_it_has_tilted_by_the_waking_angle(sign: float) -> Non
     assert math.radians(degrees) == pytest.approx(WAKING_TILT_RAD, rel=0.1)
 
 
-def test_a_load_that_something_falls_on_wakes_and_takes_it_up() -> None:
+def test_a_load_that_something_falls_on_wakes_and_takes_it_up():
     soil = filled()
     soil.add_parcels([held().position_w + held().rotation_w @ [0.6, 0.0, -0.6]], np.zeros((1, 3)))
     woke = False
@@ -106,7 +99,7 @@ def test_a_load_that_something_falls_on_wakes_and_takes_it_up() -> None:
     assert soil.payload_mass_kg == pytest.approx(61 * soil.parcel_mass_kg)
 
 
-def test_a_load_outlives_the_absence_of_its_bucket_and_another_place() -> None:
+def test_a_load_outlives_the_absence_of_its_bucket_and_another_place():
     soil = filled()
     places, mass = places_t(soil, held()), soil.payload_mass_kg
     wait(soil, None, 30)
@@ -122,7 +115,7 @@ def test_a_load_outlives_the_absence_of_its_bucket_and_another_place() -> None:
     assert soil.parcel_is_asleep.all()
 
 
-def test_a_bucket_that_comes_back_upside_down_loses_its_load() -> None:
+def test_a_bucket_that_comes_back_upside_down_loses_its_load():
     soil = filled()
     wait(soil, None, 3)
     wait(soil, held(0.0), 60)
@@ -130,7 +123,7 @@ def test_a_bucket_that_comes_back_upside_down_loses_its_load() -> None:
     assert soil.airborne_mass_kg + soil.ledger_kg()["grid"] == pytest.approx(60 * soil.parcel_mass_kg)
 
 
-def test_a_poured_load_leaves_through_the_opening_and_lands() -> None:
+def test_a_poured_load_leaves_through_the_opening_and_lands():
     soil = filled()
     opening = BUCKET.planes_t[0]
     left = 0
@@ -149,7 +142,7 @@ def test_a_poured_load_leaves_through_the_opening_and_lands() -> None:
     assert soil.ledger_kg()["grid"] == pytest.approx(60 * soil.parcel_mass_kg)
 
 
-def test_the_remainder_that_is_less_than_a_parcel_leaves_with_the_load() -> None:
+def test_the_remainder_that_is_less_than_a_parcel_leaves_with_the_load():
     soil = Soil(fidelity="fast")
     soil.reset(np.full((120, 120), 0.5))
     for tick in range(40):

@@ -10,7 +10,9 @@ from lerobot_excav.envs.soil import compiled
 CALLER = """
 from lerobot_excav.envs.soil.compiled import kernel
 from digest_probe.envs.callee import inner
-from digest_probe.envs.numbers import OFFSET
+from digest_probe.envs import numbers
+
+OFFSET = numbers.OFFSET
 
 @kernel
 def outer(x):
@@ -26,13 +28,14 @@ def inner(x):
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package in which a kernel of one file calls one of another file and uses a constant of a third."""
+def package(tmp_path, monkeypatch):
+    """A kernel of one file calls one of another file and uses a constant that a third file has from a fourth."""
     envs = tmp_path / "digest_probe" / "envs"
     envs.mkdir(parents=True)
     (envs / "caller.py").write_text(CALLER)
     (envs / "callee.py").write_text(CALLEE.format(added=1.0))
-    (envs / "numbers.py").write_text("OFFSET = 0.0\n")
+    (envs / "numbers.py").write_text("from digest_probe.envs.shared import OFFSET\n")
+    (envs / "shared.py").write_text("OFFSET = 0.0\n")
     (envs / "notes.py").write_text("NOTHING = 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(compiled, "_SOURCES", envs)
@@ -41,7 +44,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return envs
 
 
-def result(monkeypatch: pytest.MonkeyPatch) -> float:
+def result(monkeypatch):
     """Import the package as a new process would, and call its kernel."""
     for name in [name for name in sys.modules if name.split(".")[0] == "digest_probe"]:
         del sys.modules[name]
@@ -51,26 +54,22 @@ def result(monkeypatch: pytest.MonkeyPatch) -> float:
     return float(caller.outer(1.0))
 
 
-def rewrite(path: Path, text: str) -> None:
+def rewrite(path, text):
     """Change a file so that Python, too, sees it: bytecode is kept by size and whole seconds."""
     path.write_text(text)
     later = path.stat().st_mtime + 10.0
     os.utime(path, (later, later))
 
 
-def test_a_change_of_a_called_kernel_or_a_constant_in_another_file_is_seen(
-    package: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_change_of_a_called_kernel_or_a_constant_in_another_file_is_seen(package, monkeypatch):
     assert result(monkeypatch) == 4.0
     rewrite(package / "callee.py", CALLEE.format(added=5.0))
     assert result(monkeypatch) == 12.0
-    rewrite(package / "numbers.py", "OFFSET = 0.5\n")
+    rewrite(package / "shared.py", "OFFSET = 0.5\n")
     assert result(monkeypatch) == 12.5
 
 
-def test_compiled_code_is_kept_beside_the_sources_under_their_digest(
-    package: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_compiled_code_is_kept_beside_the_sources_under_their_digest(package, monkeypatch):
     result(monkeypatch)
     first = compiled._cache_directory()
     assert first.parent == package / "__pycache__"
@@ -81,17 +80,17 @@ def test_compiled_code_is_kept_beside_the_sources_under_their_digest(
     assert compiled._cache_directory() != first
 
 
-def test_where_sources_cannot_be_written_the_user_cache_is_used(
-    package: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_shared_constants_belong_to_the_kernels():
+    assert any("GRAVITY_M_S2 = " in source for source in compiled._kernel_sources())
+
+
+def test_where_sources_cannot_be_written_the_user_cache_is_used(package, monkeypatch, tmp_path):
     monkeypatch.setattr(compiled.os, "access", lambda *_: False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert compiled._cache_directory().parent == tmp_path / "cache" / "lerobot_excav"
 
 
-def test_a_cache_directory_that_was_chosen_is_left_alone(
-    package: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_cache_directory_that_was_chosen_is_left_alone(package, monkeypatch, tmp_path):
     chosen = str(tmp_path / "chosen")
     monkeypatch.setattr(compiled.numba.config, "CACHE_DIR", chosen)
     result(monkeypatch)

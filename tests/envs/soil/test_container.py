@@ -7,13 +7,11 @@ from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.errors import ConfigurationError
 
 
-def box(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Container:
-    return Container(
-        center_w=np.array([x, y, 0.0]), half_extent_m=np.array([1.0, 0.5]), wall_height_m=1.0, yaw_rad=yaw
-    )
+def box(x=0.0, y=0.0, yaw=0.0):
+    return Container(center_w=np.array([x, y, 0.0]), half_extent_m=np.array([1.0, 0.5]), wall_height_m=1.0, yaw_rad=yaw)
 
 
-def test_local_axes_turn_with_the_yaw() -> None:
+def test_local_axes_turn_with_the_yaw():
     turned = box(2.0, 3.0, yaw=np.pi / 2)
     np.testing.assert_allclose(turned.to_local(np.array([2.0, 4.0])), [1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(turned.to_local(np.array([1.0, 3.0])), [0.0, 1.0], atol=1e-12)
@@ -30,11 +28,11 @@ def test_local_axes_turn_with_the_yaw() -> None:
         (box(3.2, 3.2, yaw=-np.pi / 4), True),
     ],
 )
-def test_overlap_with_the_dig_area(placed: Container, overlaps: bool) -> None:  # noqa: FBT001
+def test_overlap_with_the_dig_area(placed, overlaps):
     assert placed.overlaps((6.0, 6.0)) is overlaps
 
 
 @pytest.mark.parametrize("height", [0.0, math.nan, math.inf])
-def test_a_box_without_walls_or_with_endless_ones_is_refused(height: float) -> None:
+def test_a_box_without_walls_or_with_endless_ones_is_refused(height):
     with pytest.raises(ConfigurationError, match="wall_height_m"):
         Container(center_w=np.zeros(3), half_extent_m=np.ones(2), wall_height_m=height, yaw_rad=0.0)

@@ -5,66 +5,46 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
+from bench.soil import BUCKET, rotation_at
 from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
 from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Intake
-from lerobot_excav.envs.soil.reference import bucket as reference
+from validation.soil.reference import bucket as reference
 
 CELL = 0.05
 PARCEL_RADIUS = 0.045
 PLANES = BUCKET.planes_t
 
 
-def rotation(yaw: float, pitch: float, roll: float) -> np.ndarray:
+def rotation(yaw, pitch, roll):
     about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
     about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
     return about_z @ rotation_at(pitch) @ about_x
 
 
-def flat(height: float) -> HeightField:
+def flat(height):
     field = HeightField((60, 60), (CELL, CELL), 0.0)
     field.reset(np.full((60, 60), height))
     return field
 
 
-def pose(edge: tuple[float, float, float], turned: np.ndarray) -> Pose:
+def pose(edge, turned):
     return Pose(position=np.array(edge) - turned @ np.array([1.15, 0.0, 0.0]), rotation=turned)
 
 
-def move(
-    field: HeightField,
-    before: Pose,
-    now: Pose,
-    room: float = 1.0,
-    bins: int = 4,
-    intake: Intake | None = None,
-) -> tuple[float, float]:
+def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     window = field.window(now.place(BUCKET.corners_t))
-    return cut(
-        field.heights,
-        field.active,
-        field.grid,
-        PLANES,
-        before.arrays,
-        now.arrays,
-        window,
-        bins,
-        room,
-        (intake.volumes, intake.frame),
-    )
+    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, intake.bins)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
 
 
 @given(angles=angles, x=st.floats(-1.2, 1.2), y=st.floats(-1.2, 1.2))
-@settings(max_examples=80, deadline=None)
-def test_a_vertical_line_is_inside_exactly_where_its_points_are(
-    angles: tuple[float, float, float], x: float, y: float
-) -> None:
+@settings(max_examples=80)
+def test_a_vertical_line_is_inside_exactly_where_its_points_are(angles, x, y):
     turned, z = rotation(*angles), np.arange(-2.0, 2.0, 0.001)
     low, high, top = column_interval(PLANES, np.zeros(3), turned, x, y)
     found = reference.column_interval(PLANES, np.zeros(3), turned, np.array([x, y]), z)
@@ -81,10 +61,8 @@ points = st.tuples(st.floats(-0.2, 1.5), st.floats(-0.6, 0.6), st.floats(-0.3, 0
 
 
 @given(before=points, mix=st.lists(st.floats(0.01, 1.0), min_size=16, max_size=16))
-@settings(max_examples=100, deadline=None)
-def test_a_point_came_through_the_face_that_the_reference_finds(
-    before: tuple[float, float, float], mix: list[float]
-) -> None:
+@settings(max_examples=100)
+def test_a_point_came_through_the_face_that_the_reference_finds(before, mix):
     now = np.array(mix) @ BUCKET.corners_t / sum(mix)
     expected = reference.crossed_face(PLANES, np.array(before), now)
     assert crossed_face(PLANES, before, tuple(now)) == expected
@@ -97,19 +75,14 @@ def test_a_point_came_through_the_face_that_the_reference_finds(
     step=st.tuples(st.floats(-0.025, 0.025), st.floats(-0.025, 0.025), st.floats(-0.025, 0.025)),
     room=st.sampled_from([0.0, 0.001, 1.0]),
 )
-@settings(max_examples=60, deadline=None)
-def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(
-    angles: tuple[float, float, float],
-    edge: tuple[float, float, float],
-    step: tuple[float, float, float],
-    room: float,
-) -> None:
+@settings(max_examples=60)
+def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(angles, edge, step, room):
     turned, field = rotation(*angles), flat(0.5)
     before, now = pose(edge, turned), pose(tuple(np.add(edge, step)), turned)
     volume, intake = field.volume_m3, Intake(BUCKET, PARCEL_RADIUS)
     entered, lost = move(field, before, now, room, intake=intake)
     assert intake.waiting_m3 == pytest.approx(entered, abs=1e-12)
-    assert (intake.volumes >= 0.0).all()
+    assert (intake.bins.volumes >= 0.0).all()
     assert field.volume_m3 + entered + lost == pytest.approx(volume, abs=1e-12)
     assert 0.0 <= entered <= room
     assert (field.heights >= 0.0).all()
@@ -120,13 +93,13 @@ def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(
                 assert field.heights[i, j] <= max(low, 0.0) + 1e-9
 
 
-def test_soil_before_the_opening_enters() -> None:
+def test_soil_before_the_opening_enters():
     turned, field = rotation_at(math.radians(-120)), flat(0.5)
     entered, _ = move(field, pose((0.0, 0.0, 0.2), turned), pose((-0.025, 0.0, 0.2), turned))
     assert entered > 0.0
 
 
-def test_soil_behind_the_shell_is_pushed_not_loaded() -> None:
+def test_soil_behind_the_shell_is_pushed_not_loaded():
     turned, field = rotation_at(math.radians(-90)), flat(0.5)
     start = pose((0.0, 0.0, 0.2), turned)
     move(field, start, start)  # clear the bucket first
@@ -136,7 +109,7 @@ def test_soil_behind_the_shell_is_pushed_not_loaded() -> None:
     assert (field.heights[:, 30] - ahead).max() > 0.0  # it piles up behind the back
 
 
-def test_a_side_plate_pushes_sideways() -> None:
+def test_a_side_plate_pushes_sideways():
     turned, field = rotation_at(math.radians(-150)), flat(0.5)
     start = pose((-0.3, 0.0, 0.2), turned)
     while move(field, start, start)[0] > 0.0:
@@ -149,7 +122,7 @@ def test_a_side_plate_pushes_sideways() -> None:
     assert (field.centres(1)[grown[:, 1]] > 0.36).all()
 
 
-def test_a_full_bucket_pushes_a_heap_before_it() -> None:
+def test_a_full_bucket_pushes_a_heap_before_it():
     turned, field = rotation_at(math.radians(-120)), flat(0.5)
     start = pose((0.0, 0.0, 0.2), turned)
     move(field, start, start)  # clear the bucket first
@@ -161,7 +134,7 @@ def test_a_full_bucket_pushes_a_heap_before_it() -> None:
     assert (field.centres(0)[raised[:, 0]] < -0.05).all()
 
 
-def test_more_bins_see_a_thinner_layer() -> None:
+def test_more_bins_see_a_thinner_layer():
     """Two samples per column decide for half a column at a time, eight see the corner of the opening."""
     turned = rotation_at(math.radians(-135))
     amounts = [
@@ -172,7 +145,7 @@ def test_more_bins_see_a_thinner_layer() -> None:
     assert amounts[0] == pytest.approx(amounts[1], rel=0.2)
 
 
-def test_soil_over_the_border_is_counted() -> None:
+def test_soil_over_the_border_is_counted():
     turned, field = rotation_at(math.radians(-120)), flat(0.5)
     volume = field.volume_m3
     edge = -1.5 + 0.06

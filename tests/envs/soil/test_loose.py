@@ -1,46 +1,34 @@
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.benchmark import BOX
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
 from lerobot_excav.envs.soil.soil import Soil
 from lerobot_excav.errors import ConfigurationError
 
-TICK = 0.02
 TILTED = Container(
     center_w=np.array([5.0, 0.5, 0.2]), half_extent_m=np.array([1.0, 0.6]), wall_height_m=0.8, yaw_rad=0.4
 )
 
 
-def fall(soil: Soil, seconds: float) -> None:
-    for _ in range(round(seconds / TICK)):
-        soil.step(TICK)
+def fall(soil, seconds):
+    for _ in range(round(seconds / TICK_S)):
+        soil.step(TICK_S)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-@pytest.mark.parametrize("height", [0.5, 1.0, 2.5])
-def test_a_parcel_falls_for_the_time_of_free_fall(height: float, fidelity: str) -> None:
-    soil = Soil(fidelity=fidelity)
-    soil.add_parcels([[0.3, 0.2, height + soil.parcel_radius_m]], [[0.0, 0.0, 0.0]])
-    ticks = 0
-    while soil.parcel_positions_w[0, 2] > soil.parcel_radius_m:
-        soil.step(TICK)
-        ticks += 1
-    assert ticks == math.ceil(math.sqrt(2 * height / GRAVITY_M_S2) / TICK - 0.06)
-
-
-@given(velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 3)))
-@settings(max_examples=20, deadline=None)
-def test_the_flight_is_a_parabola_and_gains_no_energy(velocity: tuple[float, float, float]) -> None:
+@given(
+    velocity=st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 3)),
+    fidelity=st.sampled_from(sorted(FIDELITIES)),
+)
+@settings(max_examples=20)
+def test_the_flight_is_a_parabola_and_gains_no_energy(velocity, fidelity):
     """Semi-implicit Euler falls g t dt / 2 too far and loses g^2 t dt / 2 of energy per kilogram."""
-    soil = Soil()
-    start, time, substep = np.array([0.0, 0.0, 5.0]), 0.4, TICK / soil.fidelity.substeps_per_tick
+    soil = Soil(fidelity=fidelity)
+    start, time, substep = np.array([0.0, 0.0, 5.0]), 0.4, TICK_S / soil.fidelity.substeps_per_tick
     soil.add_parcels([start], [velocity])
     energy = soil.mechanical_energy_j()
     fall(soil, time)
@@ -51,21 +39,8 @@ def test_the_flight_is_a_parabola_and_gains_no_energy(velocity: tuple[float, flo
     assert lost == pytest.approx(0.5 * soil.parcel_mass_kg * GRAVITY_M_S2**2 * time * substep, rel=1e-6)
 
 
-def test_the_centre_of_mass_of_falling_parcels_does_not_drift_sideways(rng: np.random.Generator) -> None:
-    soil = Soil()
-    start = np.array([0.0, 0.0, 4.0]) + rng.uniform(-0.15, 0.15, (60, 3))
-    soil.add_parcels(start, np.zeros((60, 3)))
-    fall(soil, 0.5)
-    assert (
-        np.linalg.norm(soil.parcel_positions_w - start, axis=1).max() > 0.05
-    )  # they pushed each other apart
-    np.testing.assert_allclose(
-        soil.parcel_positions_w[:, :2].mean(axis=0), start[:, :2].mean(axis=0), atol=1e-9
-    )
-
-
-def test_each_parcel_brings_its_mass_and_lands_where_it_falls() -> None:
-    soil = Soil(container=BOX)
+def test_each_parcel_brings_its_mass_and_lands_where_it_falls():
+    soil = Soil(container=TARGET_BOX)
     soil.add_parcels([[0.0, 0.0, 1.0], [-3.75, 4.75, 1.0], [4.0, 0.0, 1.0]], np.zeros((3, 3)))
     assert soil.ledger_kg()["parcels"] == pytest.approx(3 * soil.parcel_mass_kg)
     fall(soil, 1.5)
@@ -74,45 +49,7 @@ def test_each_parcel_brings_its_mass_and_lands_where_it_falls() -> None:
         assert ledger[place] == pytest.approx(soil.parcel_mass_kg)
 
 
-@given(
-    seed=st.integers(0, 999),
-    floor=st.sampled_from([0.0, 0.3]),
-    preset=st.sampled_from(["sand", "gravel", "dirt", "wet_sand"]),
-)
-@settings(max_examples=10, deadline=None)
-def test_a_rain_of_parcels_keeps_every_gram(seed: int, floor: float, preset: str) -> None:
-    rng = np.random.default_rng(seed)
-    soil = Soil(preset, container=TILTED, floor_depth_m=floor, fidelity="fast")
-    soil.reset(floor + rng.uniform(0.0, 0.2, (120, 120)))
-    positions = np.column_stack(
-        [rng.uniform(2.0, 6.5, 150), rng.uniform(-1.0, 2.0, 150), rng.uniform(0.1, 2.0, 150)]
-    )
-    before = sum(soil.ledger_kg().values())
-    soil.add_parcels(positions, rng.uniform(-3.0, 3.0, (150, 3)))
-    total = before + 150 * soil.parcel_mass_kg
-    for _ in range(100):
-        soil.step(TICK)
-        ledger = soil.ledger_kg()
-        assert sum(ledger.values()) == pytest.approx(total, abs=1e-6)
-        assert min(ledger.values()) >= 0.0
-    assert ledger["parcels"] < 0.2 * 150 * soil.parcel_mass_kg
-
-
-def test_a_wall_stops_a_parcel_from_outside_and_from_inside() -> None:
-    soil = Soil(container=TILTED)
-    axis = TILTED.axes_w[0]
-    outside, inside = TILTED.center_w[:2] + 1.3 * axis, TILTED.center_w[:2]
-    speed = 8.0 * axis
-    soil.add_parcels([[*outside, 0.7]], [[*-speed, 0.0]])
-    fall(soil, 1.5)
-    assert soil.ledger_kg()["box"] == 0.0
-    assert soil.ledger_kg()["out_of_bounds"] == pytest.approx(soil.parcel_mass_kg)
-    soil.add_parcels([[*inside, 0.7]], [[*speed, 0.0]])
-    fall(soil, 1.5)
-    assert soil.ledger_kg()["box"] == pytest.approx(soil.parcel_mass_kg)
-
-
-def test_a_parcel_above_the_wall_flies_over_it() -> None:
+def test_a_parcel_above_the_wall_flies_over_it():
     soil = Soil(container=TILTED)
     axis = TILTED.axes_w[0]
     soil.add_parcels([[*(TILTED.center_w[:2] + 1.6 * axis), 1.6]], [[*(-3.0 * axis), 0.0]])
@@ -127,8 +64,8 @@ def test_a_parcel_above_the_wall_flies_over_it() -> None:
     vy=st.floats(-9, 9),
     z=st.floats(0.3, 2.0),
 )
-@settings(max_examples=60, deadline=None)
-def test_no_parcel_passes_a_wall_below_its_top(x: float, y: float, vx: float, vy: float, z: float) -> None:
+@settings(max_examples=60)
+def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
     soil = Soil(container=TILTED)
     soil.add_parcels([[x, y, z]], [[vx, vy, 0.0]])
     beyond = np.abs(TILTED.to_local(np.array([x, y]))) - TILTED.half_extent_m
@@ -140,10 +77,8 @@ def test_no_parcel_passes_a_wall_below_its_top(x: float, y: float, vx: float, vy
         assert in_box == starts_inside
 
 
-def test_soil_heaped_above_the_wall_runs_out_of_the_box() -> None:
-    small = Container(
-        center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0
-    )
+def test_soil_heaped_above_the_wall_runs_out_of_the_box():
+    small = Container(center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0)
     soil = Soil(container=small)
     for _ in range(100):
         soil.add_parcels([[4.0, 0.0, 0.9]], np.zeros((1, 3)))
@@ -156,7 +91,7 @@ def test_soil_heaped_above_the_wall_runs_out_of_the_box() -> None:
     assert soil.container_heights_m[0].max() < 0.2 + 0.05
 
 
-def test_loose_parcels_weigh_on_the_column_that_they_are_over() -> None:
+def test_loose_parcels_weigh_on_the_column_that_they_are_over():
     soil = Soil(extent_m=(2.0, 2.0))
     soil.reset(np.full((40, 40), 0.1))
     soil.add_parcels([[0.312, -0.187, 1.0], [0.312, -0.187, 1.2], [5.0, 0.0, 1.0]], np.zeros((3, 3)))
@@ -167,7 +102,7 @@ def test_loose_parcels_weigh_on_the_column_that_they_are_over() -> None:
 
 
 @pytest.mark.parametrize("extent", [2.0, 3.0])
-def test_a_parcel_just_inside_the_border_weighs_on_the_last_column(extent: float) -> None:
+def test_a_parcel_just_inside_the_border_weighs_on_the_last_column(extent):
     """Rounding puts it half a cell beyond that column's centre, which is as near to the next one."""
     soil = Soil(extent_m=(extent, extent), cell_size_m=extent / 40)
     last = float(np.nextafter(extent / 2, 0.0))
@@ -175,18 +110,18 @@ def test_a_parcel_just_inside_the_border_weighs_on_the_last_column(extent: float
     assert np.argwhere(soil._loose.weighed_heights()).tolist() == [[39, 0]]
 
 
-def test_bad_parcels_are_refused() -> None:
+def test_bad_parcels_are_refused():
     with pytest.raises(ConfigurationError, match=r"allowed: both \(n, 3\)"):
         Soil().add_parcels(np.zeros((2, 3)), np.zeros((1, 3)))
     with pytest.raises(ConfigurationError, match="not finite"):
         Soil().add_parcels([[0.0, 0.0, np.nan]], np.zeros((1, 3)))
 
 
-def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while() -> None:
-    wall_x = BOX.center_w[0] + BOX.half_extent_m[0]
+def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while():
+    wall_x = TARGET_BOX.center_w[0] + TARGET_BOX.half_extent_m[0]
     for offset in (-0.001, 0.001):
-        soil = Soil(container=BOX)
-        soil.add_parcels([[wall_x + offset, BOX.center_w[1], 1.3]], np.zeros((1, 3)))
+        soil = Soil(container=TARGET_BOX)
+        soil.add_parcels([[wall_x + offset, TARGET_BOX.center_w[1], 1.3]], np.zeros((1, 3)))
         fall(soil, 4.0)
         assert soil.airborne_mass_kg == 0.0
         ledger = soil.ledger_kg()
@@ -194,7 +129,7 @@ def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while() -> None:
 
 
 @pytest.mark.parametrize("mass_kg", [1e-6, 1e-4, 1e-2])
-def test_cohesion_draws_no_crumb_through_the_ground(mass_kg: float) -> None:
+def test_cohesion_draws_no_crumb_through_the_ground(mass_kg):
     soil = Soil("wet_sand")
     soil.reset(np.full((120, 120), 0.3))
     soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]))

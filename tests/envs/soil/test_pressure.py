@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.benchmark import BUCKET, tool_at
+from bench.soil import BUCKET, tool_at
+from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle, failure_table
-from lerobot_excav.envs.soil.forces import bearing_factors, soil_numbers
+from lerobot_excav.envs.soil.forces import bearing_factors, soil_strength
 from lerobot_excav.envs.soil.height_field import HeightField
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2, PRESETS
-from lerobot_excav.envs.soil.patches import Patches
+from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.pressure import (
     SINKAGE_EXPONENT,
@@ -20,30 +20,21 @@ from lerobot_excav.envs.soil.pressure import (
     plate_limits,
     plate_overlaps,
 )
-from lerobot_excav.envs.soil.tool import Tool
 
 SAND = PRESETS["sand"]
-SOIL = soil_numbers(SAND)
+SOIL = soil_strength(SAND)
 TABLE = failure_table(SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
 WEIGHT = SAND.density_kg_m3 * GRAVITY_M_S2
 DOWN, LEVEL = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0]])
-TICK_S = 0.02
 
 
-def flat(height: float = 1.0) -> HeightField:
+def flat(height=1.0):
     field = HeightField((120, 120), (0.05, 0.05), 0.0)
     field.reset(np.full((120, 120), height))
     return field
 
 
-def limit(
-    overlap: float,
-    sinkage: float,
-    normal: np.ndarray,
-    area: float = 0.1,
-    breadth: float = 0.3,
-    factor: float = 1.0,
-) -> float:
+def limit(overlap, sinkage, normal, area=0.1, breadth=0.3, factor=1.0):
     found = plate_limits(
         np.array([overlap]),
         np.array([sinkage]),
@@ -57,7 +48,7 @@ def limit(
     return float(found[0])
 
 
-def heel_down(height: float, velocity: tuple[float, float, float] = (0.0, 0.0, -0.5)) -> Tool:
+def heel_down(height, velocity=(0.0, 0.0, -0.5)):
     """The bucket with its opening level on top and its lowest plate at a height."""
     pitch = -math.pi
     lowest = tool_at(np.zeros(3), pitch, np.zeros(3), 0.0)
@@ -66,11 +57,11 @@ def heel_down(height: float, velocity: tuple[float, float, float] = (0.0, 0.0, -
     return tool_at(np.array([0.0, 0.0, height - bottom]), pitch, np.array(velocity), 0.0)
 
 
-def pressure() -> PlatePressure:
+def pressure():
     return PlatePressure(OuterFaces.of(BUCKET, 4), SOIL, TABLE)
 
 
-def press_in(field: HeightField, depths: np.ndarray) -> list[Patches]:
+def press_in(field, depths):
     """Press the bucket down on flat ground to some depths, in turn."""
     found, plates, before = [], pressure(), -0.01
     for depth in depths:
@@ -81,8 +72,8 @@ def press_in(field: HeightField, depths: np.ndarray) -> list[Patches]:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
-def test_overlaps_are_those_of_a_plain_look_at_the_ground(seed: int) -> None:
+@settings(max_examples=20)
+def test_overlaps_are_those_of_a_plain_look_at_the_ground(seed):
     rng = np.random.default_rng(seed)
     field = flat()
     field.heights[:] = rng.uniform(0.0, 1.0, field.heights.shape)
@@ -91,26 +82,24 @@ def test_overlaps_are_those_of_a_plain_look_at_the_ground(seed: int) -> None:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     looked = points[:, :2] + 0.05 * normals[:, :2]
     expected = np.where(field.contains(looked), np.maximum(0.0, field.sample(looked) - points[:, 2]), 0.0)
-    np.testing.assert_allclose(
-        plate_overlaps(field.heights, field.grid, points, normals), expected, atol=1e-12
-    )
+    np.testing.assert_allclose(plate_overlaps(field.heights, field.grid, points, normals), expected, atol=1e-12)
 
 
-def test_a_plate_that_sinks_meets_the_measured_pressure_of_dry_sand() -> None:
+def test_a_plate_that_sinks_meets_the_measured_pressure_of_dry_sand():
     """Bekker's k z^n: 30 kPa at 2.8 cm of sinkage in the dry sand of Wong's table."""
     assert limit(0.05, 0.0281, DOWN) / 0.1 == pytest.approx(30e3, rel=0.02)
     ratio = limit(0.05, 0.06, DOWN) / limit(0.05, 0.03, DOWN)
     assert ratio == pytest.approx(2.0**SINKAGE_EXPONENT)
 
 
-def test_the_bearing_capacity_of_the_footing_bounds_the_pressure() -> None:
+def test_the_bearing_capacity_of_the_footing_bounds_the_pressure():
     _, depth_factor, width_factor = bearing_factors(SAND.friction_angle_rad)
     capacity = WEIGHT * (0.05 * depth_factor + 0.5 * 0.3 * width_factor)
     assert capacity < SINKAGE_MODULUS * 1.0
     assert limit(0.05, 1.0, DOWN) == pytest.approx(0.1 * capacity)
 
 
-def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving() -> None:
+def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving():
     """A wall of slices at all depths adds up to gamma d^2 N_gamma w, normal to the plate."""
     depth, width, count = 0.4, 0.7, 400
     levels = (np.arange(count) + 0.5) / count * depth
@@ -123,15 +112,15 @@ def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving() -> Non
     assert whole == pytest.approx(expected, rel=(PLATE_THICKNESS_M / depth) ** 2)
 
 
-def test_cohesion_adds_to_an_upright_plate_what_the_equation_says() -> None:
-    sticky = (*SOIL[:3], 2000.0, *SOIL[4:])
+def test_cohesion_adds_to_an_upright_plate_what_the_equation_says():
+    sticky = SOIL._replace(cohesion=2000.0)
     args = (np.array([0.2]), np.zeros(1), np.ones(1), LEVEL, np.array([0.1]), np.zeros(1))
     more = plate_limits(*args, sticky, TABLE)[0] - plate_limits(*args, SOIL, TABLE)[0]
     assert more == pytest.approx(0.1 * 2000.0 * TABLE[-1, 2] * math.cos(SAND.steel_friction_angle_rad))
 
 
 @pytest.mark.parametrize("normal", [DOWN, LEVEL, np.array([[0.6, 0.0, -0.8]]), np.array([[0.0, 0.6, 0.8]])])
-def test_the_pressure_starts_from_zero_at_contact(normal: np.ndarray) -> None:
+def test_the_pressure_starts_from_zero_at_contact(normal):
     """Also for a plate that has sunk far before."""
     overlaps = np.linspace(0.0, 0.1, 200)
     found = np.array([limit(float(z), 0.2, normal) for z in overlaps])
@@ -140,7 +129,7 @@ def test_the_pressure_starts_from_zero_at_contact(normal: np.ndarray) -> None:
     assert np.diff(found).max() < 0.05 * found.max()
 
 
-def test_the_ground_bears_less_beside_a_slope() -> None:
+def test_the_ground_bears_less_beside_a_slope():
     field = flat()
     points = np.array([[0.0, 0.0, 1.0]])
     assert ground_factors(field.heights, field.grid, points) == pytest.approx([1.0])
@@ -151,7 +140,7 @@ def test_the_ground_bears_less_beside_a_slope() -> None:
     assert limit(0.05, 0.05, DOWN, factor=0.36) == pytest.approx(0.36 * limit(0.05, 0.05, DOWN))
 
 
-def test_a_bucket_above_the_ground_feels_nothing_and_one_that_is_pressed_in_ever_more() -> None:
+def test_a_bucket_above_the_ground_feels_nothing_and_one_that_is_pressed_in_ever_more():
     field = flat()
     sizes = [patches.limits_n.sum() for patches in press_in(field, np.linspace(-0.01, 0.25, 53))]
     above, below = sizes[:3], sizes[3:]
@@ -161,7 +150,7 @@ def test_a_bucket_above_the_ground_feels_nothing_and_one_that_is_pressed_in_ever
     assert below[-1] > 20e3
 
 
-def test_the_sinkage_is_forgotten_when_the_plate_leaves_the_ground() -> None:
+def test_the_sinkage_is_forgotten_when_the_plate_leaves_the_ground():
     field, plates = flat(), pressure()
     down = heel_down(0.9, (0.0, 0.0, -1.0))
     sizes = []
@@ -172,20 +161,13 @@ def test_the_sinkage_is_forgotten_when_the_plate_leaves_the_ground() -> None:
     assert sizes[4] == sizes[0]
 
 
-def test_a_plate_that_is_drawn_back_gets_weaker_soil() -> None:
-    field, plates = flat(), pressure()
-    before = [plates.patches(field.heights, field.grid, heel_down(0.9, (0, 0, -1.0)), 0.0, TICK_S)][-1]
-    after = plates.patches(field.heights, field.grid, heel_down(0.9, (0, 0, 0.5)), 0.0, TICK_S)
-    assert after.limits_n.sum() < before.limits_n.sum()
-
-
-def test_the_ground_pushes_out_of_itself_and_into_the_bucket() -> None:
+def test_the_ground_pushes_out_of_itself_and_into_the_bucket():
     for patches in press_in(flat(), np.array([0.05, 0.1])):
         assert (patches.normals_w[:, 2] > -1e-9).all()
         assert np.tan(SAND.steel_friction_angle_rad) == pytest.approx(patches.frictions[0])
 
 
-def test_soil_on_one_side_pushes_to_the_other() -> None:
+def test_soil_on_one_side_pushes_to_the_other():
     field = flat(0.0)
     field.heights[:, 68:] = 1.0  # beyond the left side plate only
     tool = heel_down(0.3, (0.0, 1.0, 0.0))
@@ -193,12 +175,3 @@ def test_soil_on_one_side_pushes_to_the_other() -> None:
     assert len(patches) > 0
     np.testing.assert_allclose(patches.normals_w, np.tile([0.0, -1.0, 0.0], (len(patches), 1)), atol=1e-9)
     assert patches.wrench(tool.position_w, tool.linear_velocity_w, np.zeros(3))[0][1] < -500.0
-
-
-def test_the_depth_of_the_floor_shifts_the_ground_only() -> None:
-    field = flat()
-    tool, lower = heel_down(0.8, (0, 0, -1.0)), heel_down(0.1, (0, 0, -1.0))
-    same = pressure().patches(field.heights, field.grid, tool, 0.0, TICK_S)
-    deep = pressure().patches(field.heights, field.grid, lower, 0.7, TICK_S)
-    np.testing.assert_allclose(deep.limits_n, same.limits_n, rtol=1e-9)
-    np.testing.assert_allclose(deep.points_w[:, 2] + 0.7, same.points_w[:, 2])

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from bench.soil import BUCKET, tool_at
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil, Tool
-from lerobot_excav.envs.soil.benchmark import BUCKET, TICK_S, tool_at
 from lerobot_excav.envs.soil.relaxation import REST_TAN
+from validation.soil.reference.plates import nearest_point, plate_polygons
 
 TICKS = 120
 GOAL_TICKS = 40
@@ -94,9 +96,7 @@ def distance_to_plates(points_t):
     """Return (n,) distances of tool points to the nearest of bottom, back and side plates."""
     outline, half = BUCKET.profile_t, 0.5 * BUCKET.inner_width_m
     flat, aside = points_t[:, [0, 2]], np.abs(points_t[:, 1])
-    sides = np.array(
-        [to_segment(flat, a, b) for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)]
-    )
+    sides = np.array([to_segment(flat, a, b) for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)])
     is_inside = (flat @ BUCKET.planes_t[:-2, [0, 2]].T <= BUCKET.planes_t[:-2, 3]).all(axis=1)
     to_shell = np.hypot(sides[:-1].min(axis=0), np.maximum(aside - half, 0.0))  # the last side is the opening
     to_cheeks = np.hypot(aside - half, np.where(is_inside, 0.0, sides.min(axis=0)))
@@ -131,9 +131,7 @@ def assert_sound(soil, total):
 
 def few(examples):
     """Few examples, always the same ones: every one is a dig of several seconds of computing under a new soil."""
-    return settings(
-        max_examples=examples, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate)
-    )
+    return settings(max_examples=examples, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
 
 
 every_soil = pytest.mark.parametrize("preset", PRESETS)
@@ -167,14 +165,13 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
     rng = np.random.default_rng(seed)
     soil = random_soil(preset, fidelity, rng, 0.0)
     total = sum(soil.ledger_kg().values())
-    for tool in motion([*random_goals(rng), DUMPED, DUMPED, DUMPED]):
-        soil.step(TICK_S, tool)
+    for tick, tool in enumerate(motion([*random_goals(rng), DUMPED, DUMPED, DUMPED])):
+        soil.step(TICK_S, tool if tick % 40 != 39 else None)  # a bucket that goes and comes takes nothing along
+        assert_sound(soil, total)
     before = b""
     for _ in range(3000):
         soil.step(TICK_S)
-        speed = np.abs(soil.parcel_velocities_w).max(
-            initial=0.0
-        )  # one may be left that lies on the rim of the box
+        speed = np.abs(soil.parcel_velocities_w).max(initial=0.0)  # one may be left on the rim of the box
         if speed < 0.01 and soil.heights_m.tobytes() == before:
             break
         before = soil.heights_m.tobytes()
@@ -186,21 +183,9 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
 
 @given(points=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20))
 @few(25)
-def test_the_distance_to_the_plates_is_that_of_points_sampled_on_them(points):
+def test_the_distance_to_the_plates_is_that_of_the_reference(points):
     """Keeps the judge of the first test honest."""
-    points_t = np.array(points)
-    half, share = 0.5 * BUCKET.inner_width_m, np.linspace(0.0, 1.0, 40)
-    sampled = []
-    for start, end in itertools.pairwise(BUCKET.profile_t):
-        line = start + share[:, None] * (end - start)
-        for y in np.linspace(-half, half, 40):
-            sampled.append(np.column_stack([line[:, 0], np.full(40, y), line[:, 1]]))
-    centre = BUCKET.profile_t.mean(axis=0)
-    outline = np.vstack([BUCKET.profile_t, BUCKET.profile_t[:1]])
-    for start, end in itertools.pairwise(outline):
-        for part in share:
-            line = centre + part * (start + share[:, None] * (end - start) - centre)
-            sampled += [np.column_stack([line[:, 0], np.full(40, y), line[:, 1]]) for y in (-half, half)]
-    cloud = np.concatenate(sampled)
-    expected = np.min(np.linalg.norm(points_t[:, None] - cloud, axis=2), axis=1)
-    np.testing.assert_allclose(distance_to_plates(points_t), expected, atol=0.03)
+    outline, half = BUCKET.profile_t, 0.5 * BUCKET.inner_width_m
+    plates = plate_polygons(outline, half)
+    expected = [min(np.linalg.norm(p - nearest_point(plate, np.array(p))) for plate in plates) for p in points]
+    np.testing.assert_allclose(distance_to_plates(np.array(points)), expected, atol=1e-9)

@@ -1,29 +1,32 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.tasks.selection import select_scene_and_target
+from lerobot_excav.envs.tasks.selection import select_episode
 from lerobot_excav.errors import ConfigurationError
 
 
 def select(seed=None, rng_seed=0, targets=4, **options):
     rng = np.random.default_rng(rng_seed)
-    return select_scene_and_target(seed, options, rng=rng, target_count=targets)
+    chosen = select_episode(seed, options, rng=rng, target_count=targets)
+    return chosen.scene_id, chosen.target_id, chosen.schedule
 
 
 @pytest.mark.parametrize(
-    ("seed", "targets", "expected"), [(0, 4, (0, 0)), (1006, 4, (1006, 2)), (5, 3, (5, 2))]
+    ("seed", "targets", "options", "expected"),
+    [
+        (0, 4, {}, (0, 0, None)),
+        (1006, 4, {}, (1006, 2, None)),
+        (5, 3, {}, (5, 2, None)),
+        (1006, 4, {"scene_id": 3, "target_id": 1}, (3, 1, None)),
+        (1006, 4, {"target_id": 1}, (1006, 1, None)),
+        (1006, 4, {"scene_id": 7}, (7, 3, None)),
+        (6, 4, {"lerobot_new_rollout": True}, (6, 2, None)),
+        (6, 4, {"commands": []}, (6, 2, ())),
+        (6, 4, {"commands": [[3, 1], (9, 0)]}, (6, 2, ((3, 1), (9, 0)))),
+    ],
 )
-def test_a_seed_is_the_scene_and_its_remainder_the_target(seed, targets, expected):
-    assert select(seed, targets=targets) == expected
-
-
-def test_options_go_before_the_seed():
-    assert select(1006, scene_id=3, target_id=1) == (3, 1)
-    assert select(1006, target_id=1) == (1006, 1)
-
-
-def test_a_scene_without_a_target_takes_the_one_of_its_seed():
-    assert select(1006, scene_id=7) == (7, 3)
+def test_options_go_before_the_seed_whose_remainder_is_the_target(seed, targets, options, expected):
+    assert select(seed, targets=targets, **options) == expected
 
 
 def test_without_either_the_generator_decides():
@@ -31,12 +34,8 @@ def test_without_either_the_generator_decides():
 
 
 def test_numpy_integers_become_pythons_own():
-    chosen = select(scene_id=np.int64(3), target_id=np.int32(1))
-    assert [type(number) for number in chosen] == [int, int]
-
-
-def test_lerobots_own_options_are_passed_over():
-    assert select(6, lerobot_new_rollout=True) == (6, 2)
+    scene_id, target_id, schedule = select(scene_id=np.int64(3), target_id=np.int32(1), commands=np.array([[2, 3]]))
+    assert {type(number) for number in (scene_id, target_id, *schedule[0])} == {int}
 
 
 @pytest.mark.parametrize(
@@ -47,7 +46,11 @@ def test_lerobots_own_options_are_passed_over():
         ({"scene_id": 2**63}, "scene_id=9223372036854775808"),
         ({"target_id": True}, "target_id=True"),
         ({"target_id": 4}, "target_id=4 .*from 0 to 3"),
-        ({"scene": 3}, "options='scene' .*'scene_id', 'target_id'"),
+        ({"scene": 3}, "options='scene' .*'scene_id', 'target_id', 'commands'"),
+        ({"commands": [(0, 1)]}, "commands: frame=0 .*from 1 on"),
+        ({"commands": [(4, 1), (4, 2)]}, "commands: frame=4 .*from 5 on"),
+        ({"commands": [(4, 7)]}, "commands: target_id=7 .*from 0 to 3"),
+        ({"commands": [(4, 1, 2)]}, "is not a pair"),
     ],
 )
 def test_unusable_options_are_refused(options, named):

@@ -67,9 +67,7 @@ def write_evaluation(metrics_file, tmp_path):
 
 def write_clip(path, frames=20, rate=50):
     """Write a video that brightens by 5 a frame."""
-    write_video(
-        path, [np.full((24, 32, 3), 5 * number, dtype=np.uint8) for number in range(frames)], rate, crf=23
-    )
+    write_video(path, [np.full((24, 32, 3), 5 * number, dtype=np.uint8) for number in range(frames)], rate, crf=23)
 
 
 @pytest.fixture

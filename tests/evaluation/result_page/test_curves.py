@@ -13,10 +13,7 @@ def curve(tmp_path, grasp_line):
 
     def read(**evaluations):
         for name, changes in evaluations.items():
-            lines = [
-                grasp_line(i, **{"scene_set": "val", **changes, **changes.get(f"at_{i}", {})})
-                for i in range(2)
-            ]
+            lines = [grasp_line(i, **{"scene_set": "val", **changes, **changes.get(f"at_{i}", {})}) for i in range(2)]
             (tmp_path / f"{name[1:]}.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
         return read_curve(CurveSource(label="c", folder=str(tmp_path)))
 

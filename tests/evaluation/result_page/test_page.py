@@ -170,9 +170,7 @@ def scoop(finished, write_evaluation, scoop_line, tmp_path):
 
 @pytest.mark.usefixtures("scoop")
 def test_tasks_are_not_mixed_in_a_section(read_rows):
-    with pytest.raises(
-        DatasetError, match=r"scoop is of Scoop-v0 and paired of FR5Grasp-v0; report them apart"
-    ):
+    with pytest.raises(DatasetError, match=r"scoop is of Scoop-v0 and paired of FR5Grasp-v0; report them apart"):
         make_page(read_rows(f'[[section]]\ntitle = "s"\n{TWO_ROWS}'))
 
 
@@ -197,9 +195,7 @@ def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line,
     assert first != second
 
 
-def test_a_row_whose_checkpoint_is_gone_still_has_its_command(
-    finished, tmp_path, grasp_line, write_evaluation
-):
+def test_a_row_whose_checkpoint_is_gone_still_has_its_command(finished, tmp_path, grasp_line, write_evaluation):
     write_evaluation("test/later", [grasp_line(0)], tmp_path / "gone")
     row = make_page(finished).rows[2]
     assert row.origin.training is None

@@ -44,7 +44,7 @@ def test_clips_of_any_rate_are_shown_in_real_time(clip, tmp_path, rate):
 
 
 def test_the_border_tells_success_and_obedience_to_a_wrong_mask(clip, tmp_path):
-    failure = {"is_success": False, "mask_condition": "mismatched", "shown_block": 2}
+    failure = {"is_success": False, "mask_condition": "mismatched", "shown_target_id": 2}
     obeyed, ignored = ({**failure, "first_grasped_block": block} for block in (2, 1))
     dropped = {"is_success": False, "first_grasped_block": 0}
     write_grid(

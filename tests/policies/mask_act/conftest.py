@@ -51,8 +51,7 @@ def stem(network: nn.Module) -> nn.Conv2d:
 def make_batch(batch_size: int = 3, *, seed: int = 0, actions: bool = False) -> dict[str, Any]:
     generator = torch.Generator().manual_seed(seed)
     batch: dict[str, Any] = {
-        key: torch.rand(batch_size, *feature.shape, generator=generator)
-        for key, feature in INPUT_FEATURES.items()
+        key: torch.rand(batch_size, *feature.shape, generator=generator) for key, feature in INPUT_FEATURES.items()
     }
     batch[MASK] = square_mask(batch_size, top=8, left=16)
     if actions:

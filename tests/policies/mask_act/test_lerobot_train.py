@@ -81,8 +81,6 @@ def test_fine_tuning_on_another_dataset_keeps_the_mask_unscaled(checkpoint, tmp_
 def test_a_dataset_without_masks_trains_the_no_condition_variant_only(checkpoint, tmp_path):
     unmasked = make_dataset(tmp_path / "data", seed=2, cameras=("main", "cab"))
     for name, policy in (("new", NEW), ("tuned", [f"--policy.path={checkpoint}"])):
-        with pytest.raises(
-            ConfigurationError, match=r"no .*'observation.images.target_mask'.*withhold_mask=true"
-        ):
+        with pytest.raises(ConfigurationError, match=r"no .*'observation.images.target_mask'.*withhold_mask=true"):
             train(unmasked, tmp_path / name, *policy, "--steps=1")
     assert train(unmasked, tmp_path / "blind", *NEW, "--policy.withhold_mask=true", "--steps=1").is_dir()

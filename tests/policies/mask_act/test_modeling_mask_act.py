@@ -31,9 +31,7 @@ def test_a_policy_can_be_built_for_another_camera_and_no_mask():
 
 
 @pytest.mark.parametrize("backbone", BACKBONES)
-def test_a_fresh_policy_equals_its_maskless_twin_bit_for_bit_and_training_wakes_the_mask(
-    policy, batch, backbone
-):
+def test_a_fresh_policy_equals_its_maskless_twin_bit_for_bit_and_training_wakes_the_mask(policy, batch, backbone):
     agent, blind = policy(vision_backbone=backbone), policy(vision_backbone=backbone, withhold_mask=True)
     observation = batch(actions=True)
     assert torch.equal(agent.predict_action_chunk(observation), blind.predict_action_chunk(observation))
@@ -43,9 +41,7 @@ def test_a_fresh_policy_equals_its_maskless_twin_bit_for_bit_and_training_wakes_
 
 
 @pytest.mark.parametrize("token", [False, True])
-def test_a_seen_mask_moves_the_plan_and_a_withheld_mask_leaves_no_trace_bit_for_bit(
-    awake, batch, mask, token
-):
+def test_a_seen_mask_moves_the_plan_and_a_withheld_mask_leaves_no_trace_bit_for_bit(awake, batch, mask, token):
     observation, empty = batch(), torch.zeros_like(batch()[MASK])
     others = [{**observation, MASK: other} for other in (mask(3, top=0, left=0), empty, empty + 1)]
     seeing, blind = awake(target_token=token), awake(target_token=token, withhold_mask=True)

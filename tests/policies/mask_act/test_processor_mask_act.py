@@ -44,9 +44,7 @@ def test_the_mask_stays_out_of_normalisation_through_fine_tuning(tmp_path, confi
         "normalizer_processor": norm,
         "rename_observations_processor": {"rename_map": {}},
     }
-    preprocess, _ = make_pre_post_processors(
-        settings, pretrained_path=str(tmp_path), preprocessor_overrides=overrides
-    )
+    preprocess, _ = make_pre_post_processors(settings, pretrained_path=str(tmp_path), preprocessor_overrides=overrides)
     check(preprocess, batch)
     step = next(step for step in preprocess.steps if isinstance(step, NormalizerProcessorStep))
     assert MASK not in step.normalize_observation_keys

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.scripts import lerobot_record, lerobot_replay
+from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 
 from lerobot_excav.datasets.format.schema import dataset_features, excav_features
-from lerobot_excav.datasets.record.excavator_environment import EXCAVATOR
 from lerobot_excav.envs.machines.excavator.features import STATE_NAMES
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
@@ -106,9 +106,7 @@ def test_a_recording_has_the_schema_of_scripted_data(record: Run, tmp_path: Path
     assert dataset.fps == 10
 
 
-def test_an_episode_recorded_again_starts_over(
-    record: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_episode_recorded_again_starts_over(record: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keys = {
         "exit_early": False,
         "rerecord_episode": True,

@@ -1,6 +1,5 @@
 """What only the simulated arm does; what it shares with other robots is in tests/contract."""
 
-import logging
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -96,13 +95,3 @@ def test_a_rollout_drives_it_home_by_an_ordinary_motion(make_robot: MakeRobot) -
     # The servos trail the last command of the motion.
     assert list(positions(robot).values()) == pytest.approx(list(home.values()), abs=0.2)
     assert abs(positions(robot)["j1.pos"] - home["j1.pos"]) < 0.5 * 0.3
-
-
-def test_a_session_names_the_environment(make_robot: MakeRobot) -> None:
-    robot = make_robot()
-    level = logging.getLogger().level
-    logging.getLogger().setLevel(logging.NOTSET)  # as LeRobot's commands do
-    logging.info("Recording episode 0")
-    logging.getLogger().setLevel(level)
-    robot.disconnect()
-    assert '"env": "fr5_grasp"' in (robot.config.session_log or Path()).read_text()

@@ -25,9 +25,7 @@ JOYDEVICEREMOVED = 17
 def controller():
     """SDL's view of a known gamepad: integers by axis name."""
     axes, down = {"LX": 32767, "LY": 0, "RX": 0, "RY": -16384}, {"B7"}
-    return SimpleNamespace(
-        name="Pad", attached=lambda: True, get_axis=axes.__getitem__, get_button=down.__contains__
-    )
+    return SimpleNamespace(name="Pad", attached=lambda: True, get_axis=axes.__getitem__, get_button=down.__contains__)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
@@ -21,10 +21,10 @@ def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> 
         driven = []
         for _ in range(25):
             driven.append(list(operator.get_action().values()))
-            robot.send_action(dict(zip(robot.action_names, driven[-1], strict=True)))
+            robot.send_action(dict(zip(robot.task_spec.action_names, driven[-1], strict=True)))
     env = ExcavatorEnv(obs_type="agent_pos")
     env.reset(options={"scene_id": 1, "target_id": 2})
-    script = ScriptedOperator(rng=np.random.default_rng((3, 1, 2)))
+    script = DigOperator(rng=np.random.default_rng((3, 1, 2)))
     script.reset(env)
     expected = []
     for _ in range(25):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
-from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.grasp.operator import GraspOperator
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.fr5_sim.fr5_sim import FR5Sim
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
@@ -25,7 +25,7 @@ def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> 
             robot.send_action(driven[-1])
     env = FR5GraspEnv(**SIZE)
     env.reset(options={"scene_id": 1, "target_id": 2})
-    script = ScriptedOperator(rng=np.random.default_rng((3, 1, 2)))
+    script = GraspOperator(rng=np.random.default_rng((3, 1, 2)))
     script.reset(env)
     for action in driven:
         expected = script.act(env)

@@ -78,9 +78,7 @@ def patch_rows(jacobian: Array, rotation: Array, points_t: Array, axes_t: Array)
         for j in range(joints):
             for a in range(3):
                 b, c = (a + 1) % 3, (a + 2) % 3
-                velocity[a] = (
-                    motion[a, j] + motion[3 + b, j] * points_t[k, c] - motion[3 + c, j] * points_t[k, b]
-                )
+                velocity[a] = motion[a, j] + motion[3 + b, j] * points_t[k, c] - motion[3 + c, j] * points_t[k, b]
             for row in range(3):
                 for a in range(3):
                     rows[k, row, j] += axes_t[k, row, a] * velocity[a]
@@ -155,9 +153,7 @@ def _rise(speeds: Array, changes: Array, share: float, limits: Array, grips: Arr
 
 
 @kernel
-def _lowest_share(
-    speeds: Array, changes: Array, limits: Array, grips: Array, slope: float, curvature: float
-) -> float:
+def _lowest_share(speeds: Array, changes: Array, limits: Array, grips: Array, slope: float, curvature: float) -> float:
     """Return the share in (0, 1] of a step at which the function is lowest along it.
 
     Args:

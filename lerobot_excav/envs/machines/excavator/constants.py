@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
+from lerobot_excav.envs import constants as shared
+
 Kind = Literal["datasheet", "paper", "derived", "tuned", "guess"]
 
 
@@ -42,18 +44,18 @@ JOINT_NAMES = ("swing", "boom", "arm", "bucket")
 
 # --- time and place ---------------------------------------------------------------------------------
 
-TICK_S = _constant("TICK_S", 0.02, "s", "paper", "control and soil step of the published 50 Hz set-up")
+TICK_S = _constant("TICK_S", shared.TICK_S, "s", "paper", "control and soil step of the published 50 Hz set-up")
 SUBSTEP_S = _constant("SUBSTEP_S", 0.002, "s", "tuned", "servos are stable from 2 to 5 ms; 2 ms for contacts")
-GRAVITY_M_S2 = _constant("GRAVITY_M_S2", 9.81, "m/s2", "paper", "standard gravity, rounded as MuJoCo does")
+GRAVITY_M_S2 = _constant(
+    "GRAVITY_M_S2", shared.GRAVITY_M_S2, "m/s2", "paper", "standard gravity, rounded as MuJoCo does"
+)
 MACHINE_POS_W = _constant(
     "MACHINE_POS_W", (-4.6, 0.0, 0.0), "m", "tuned", "puts the 6 m dig area inside the digging envelope"
 )
 
 # --- kinematics: all pins lie in the plane of the swing axis ----------------------------------------
 
-SWING_HEIGHT_M = _constant(
-    "SWING_HEIGHT_M", 0.77, "m", "guess", "top of the slewing ring of an 8-t undercarriage"
-)
+SWING_HEIGHT_M = _constant("SWING_HEIGHT_M", 0.77, "m", "guess", "top of the slewing ring of an 8-t undercarriage")
 BOOM_PIN_S = _constant(
     "BOOM_PIN_S", (0.75, 0.0, 0.38), "m", "derived", "swing frame; fitted to the DX80R working ranges"
 )

@@ -80,9 +80,7 @@ class RateControl:
             wanted = command[joint] * const.JOINT_SPEED_RAD_S[joint]
             vel = _clipped(wanted, vel - accel * dt_s, vel + accel * dt_s)
             # Towards a joint limit: no faster than can still be stopped at the rated deceleration.
-            vel = _clipped(
-                vel, -sqrt(2.0 * accel * max(pos - lower, 0.0)), sqrt(2.0 * accel * max(upper - pos, 0.0))
-            )
+            vel = _clipped(vel, -sqrt(2.0 * accel * max(pos - lower, 0.0)), sqrt(2.0 * accel * max(upper - pos, 0.0)))
             lead = const.SERVO_DEFLECTION_RAD
             pos = _clipped(pos + vel * dt_s, measured - lead, measured + lead)
             pos = _clipped(pos, lower, upper)

@@ -12,7 +12,7 @@ from lerobot_excav.envs.soil.tool import Reaction
 Array = NDArray[np.float64]
 
 
-class DiggingResistance:
+class JointResistance:
     """Applies the soil's patches to the bucket so that they only ever brake.
 
     The soil says once per tick what each patch can hold. How much of that acts is decided here in every substep

@@ -31,9 +31,7 @@ def forward(joint_pos: ArrayLike) -> tuple[NDArray[np.float64], float]:
     return edge, float(angles[2])
 
 
-def inverse(
-    radius_m: float, height_m: float, pitch_rad: float, swing_rad: float
-) -> NDArray[np.float64] | None:
+def inverse(radius_m: float, height_m: float, pitch_rad: float, swing_rad: float) -> NDArray[np.float64] | None:
     """Return the joint angles that hold the cutting edge at a point with a given bucket pitch.
 
     The elbow is always up: the arm cannot bend the other way.
@@ -75,7 +73,4 @@ def _in_range(angle: float, limits: tuple[float, float]) -> float:
 
 def _within_limits(joint_pos: NDArray[np.float64]) -> bool:
     lower, upper = np.array(const.JOINT_RANGE_RAD).T
-    return bool(
-        np.all(joint_pos >= lower - _LIMIT_TOLERANCE_RAD)
-        and np.all(joint_pos <= upper + _LIMIT_TOLERANCE_RAD)
-    )
+    return bool(np.all(joint_pos >= lower - _LIMIT_TOLERANCE_RAD) and np.all(joint_pos <= upper + _LIMIT_TOLERANCE_RAD))

@@ -8,7 +8,7 @@ from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.control import RateControl, checked_action
-from lerobot_excav.envs.machines.excavator.digging import DiggingResistance
+from lerobot_excav.envs.machines.excavator.digging import JointResistance
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
 from lerobot_excav.envs.soil.container import Container
@@ -53,7 +53,7 @@ class ExcavatorMachine:
         self.model = build_spec(container, terrain_shape_m).compile()
         self.data = mujoco.MjData(self.model)
         self._control = RateControl()
-        self._resistance = DiggingResistance(self.model)
+        self._resistance = JointResistance(self.model)
         self._payload = Payload(self.model)
         self._geometry = bucket_geometry()
         self._bucket = self.model.body("bucket").id
@@ -192,9 +192,7 @@ class ExcavatorMachine:
 def _checked_joint_pos(joint_pos: object) -> NDArray[np.float64]:
     array = np.asarray(joint_pos, dtype=np.float64)
     if array.shape != (4,):
-        raise ConfigurationError(
-            f"joint_pos has shape {array.shape}; allowed: (4,) for {', '.join(const.JOINT_NAMES)}"
-        )
+        raise ConfigurationError(f"joint_pos has shape {array.shape}; allowed: (4,) for {', '.join(const.JOINT_NAMES)}")
     for name, value, (lower, upper) in zip(const.JOINT_NAMES, array, const.JOINT_RANGE_RAD, strict=True):
         if not lower - 1e-9 <= value <= upper + 1e-9:
             raise ConfigurationError(

@@ -140,9 +140,7 @@ def _add_machine(spec: mujoco.MjSpec) -> None:
         spec, carrier, 0, (0.0, 0.0, const.SWING_HEIGHT_M),
         const.HOUSE_MASS_KG, const.HOUSE_COM_S, const.HOUSE_INERTIA_KGM2,
     )  # fmt: skip
-    boom = _add_link(
-        spec, house, 1, const.BOOM_PIN_S, const.BOOM_MASS_KG, const.BOOM_COM_M, const.BOOM_INERTIA_KGM2
-    )
+    boom = _add_link(spec, house, 1, const.BOOM_PIN_S, const.BOOM_MASS_KG, const.BOOM_COM_M, const.BOOM_INERTIA_KGM2)
     arm = _add_link(
         spec, boom, 2, (const.BOOM_LENGTH_M, 0.0, 0.0),
         const.ARM_MASS_KG, const.ARM_COM_M, const.ARM_INERTIA_KGM2,

@@ -111,9 +111,7 @@ class Payload:
             return
         mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._body)
         rotation = data.xmat[self._body].reshape(3, 3)
-        taken = momentum_taken(
-            self._jacobian, rotation, data.qvel, self._com_t, com_before, self.mass_kg, kept_kg
-        )
+        taken = momentum_taken(self._jacobian, rotation, data.qvel, self._com_t, com_before, self.mass_kg, kept_kg)
         data.qfrc_applied[:] -= taken / const.SUBSTEP_S
 
     def _write(self) -> None:

@@ -1,5 +1,7 @@
 """The worksite: machine, soil and target box, advanced together one tick at a time."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,21 @@ from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import Reaction, Soil, SoilParameters, Tool
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorksiteStart:
+    """How a worksite is before the first command. Its arrays are read-only.
+
+    Attributes:
+        joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+        heights_m: Soil above the floor [m], shape (nx, ny).
+        appearance: Colours and light.
+    """
+
+    joint_pos: NDArray[np.float64]
+    heights_m: NDArray[np.float64]
+    appearance: Appearance
 
 
 class Worksite:
@@ -37,23 +54,11 @@ class Worksite:
         self.reaction: Reaction | None = None
         self._ticks = 0
 
-    def reset(
-        self,
-        *,
-        joint_pos: NDArray[np.float64],
-        heights_m: NDArray[np.float64],
-        appearance: Appearance,
-    ) -> None:
-        """Start again, exactly.
-
-        Args:
-            joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
-            heights_m: Soil above the floor [m], shape (nx, ny).
-            appearance: Colours and light.
-        """
-        self.machine.set_appearance(appearance)
-        self.machine.reset(joint_pos)
-        self.soil.reset(heights_m)
+    def reset(self, start: WorksiteStart) -> None:
+        """Start again, exactly."""
+        self.machine.set_appearance(start.appearance)
+        self.machine.reset(start.joint_pos)
+        self.soil.reset(start.heights_m)
         self._ticks, self.time_s = 0, 0.0
         self.reaction = None
 

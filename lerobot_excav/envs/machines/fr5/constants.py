@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-GRAVITY_M_S2 = 9.81
-CONTROL_TICK_S = 0.02
-"""Duration of one command [s]: 50 Hz (kind: paper)."""
+from lerobot_excav.envs.constants import GRAVITY_M_S2 as GRAVITY_M_S2
+from lerobot_excav.envs.constants import TICK_S
+
+CONTROL_TICK_S = TICK_S
 SUBSTEP_S = 0.002
 """MuJoCo's time step [s]; the contacts of a gripped block need it (kind: tuned)."""
 

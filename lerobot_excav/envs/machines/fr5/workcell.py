@@ -10,20 +10,16 @@ from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW
 from lerobot_excav.envs.machines.fr5.geoms import ARM
-from lerobot_excav.envs.machines.fr5.look import WorkcellLook
 from lerobot_excav.envs.machines.fr5.mjcf import build_model
+from lerobot_excav.envs.machines.fr5.start import WorkcellStart
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
 ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper target [0..1]
 _SUBSTEPS = round(const.CONTROL_TICK_S / const.SUBSTEP_S)
 _SETTLE_TICKS = 10  # 0.2 s, for blocks to find their contact with the table
 
-_CTRL_SCALE = np.append(
-    np.ones(6), const.FINGER_STROKE_M
-)  # from an action to what the servos are given [rad, m]
-_REFERENCE_STEP = const.SUBSTEP_S * np.append(
-    const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M
-)
+_CTRL_SCALE = np.append(np.ones(6), const.FINGER_STROKE_M)  # from an action to what the servos are given [rad, m]
+_REFERENCE_STEP = const.SUBSTEP_S * np.append(const.JOINT_SPEED_RAD_S, const.FINGER_SPEED_M_S / const.FINGER_STROKE_M)
 """How far the servos' reference may move in a substep: the speed limits [rad, 1]."""
 _REFERENCE_LEAD_RAD = np.array(const.JOINT_DAMPING) / const.JOINT_STIFFNESS * const.JOINT_SPEED_RAD_S
 """How far it may be ahead of a joint: there the servo's stiffness and damping balance at the speed limit [rad]. Without
@@ -52,33 +48,19 @@ class Workcell:
         self._pads = {self.model.geom(f"{name}_pad").id: i for i, name in enumerate(const.FINGER_NAMES)}
         self._reference: NDArray[np.float64] = np.zeros(ACTION_SIZE)
 
-    def reset(
-        self,
-        *,
-        joint_pos: NDArray[np.float64],
-        block_pos_w: NDArray[np.float64],
-        block_yaw: NDArray[np.float64],
-        look: WorkcellLook,
-    ) -> None:
-        """Put the cell into a starting state, at rest.
-
-        Args:
-            joint_pos: Joint positions of the arm [rad], (6,).
-            block_pos_w: Centres of the blocks [m], (4, 3), world frame.
-            block_yaw: Turn of the blocks about z [rad], (4,).
-            look: Colours and light.
-        """
+    def reset(self, start: WorkcellStart) -> None:
+        """Put the cell into a starting state, at rest."""
         mujoco.mj_resetData(self.model, self.data)
-        self._paint(look)
-        for i, (position_w, yaw) in enumerate(zip(block_pos_w, block_yaw, strict=True)):
-            start = self._block_qpos[i]
-            self.data.qpos[start : start + 7] = [*position_w, np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]
-        self.data.qpos[self._qpos[:6]] = joint_pos
+        self._paint(start)
+        for i, (position_w, yaw) in enumerate(zip(start.block_pos_w, start.block_yaw, strict=True)):
+            first = self._block_qpos[i]
+            self.data.qpos[first : first + 7] = [*position_w, np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]
+        self.data.qpos[self._qpos[:6]] = start.joint_pos
         self.data.qpos[self._qpos[6:]] = const.FINGER_STROKE_M
-        self._reference = np.append(joint_pos, 1.0)
+        self._reference = np.append(start.joint_pos, 1.0)
         mujoco.mj_forward(self.model, self.data)
         for _ in range(_SETTLE_TICKS):
-            self.tick(np.append(joint_pos, 1.0))
+            self.tick(np.append(start.joint_pos, 1.0))
         self.data.time = 0.0
 
     def tick(self, action: NDArray[np.float64]) -> None:
@@ -107,9 +89,7 @@ class Workcell:
             self._lead_to(target)
             mujoco.mj_step(self.model, self.data)
         if self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
-            raise ExcavError(
-                f"the simulation diverged at {self.data.time:.3f} s; report this scene and action"
-            )
+            raise ExcavError(f"the simulation diverged at {self.data.time:.3f} s; report this scene and action")
 
     @property
     def joint_pos(self) -> NDArray[np.float64]:
@@ -183,9 +163,9 @@ class Workcell:
         self._reference[:6] = np.clip(self._reference[:6], low, high)
         self.data.ctrl[:] = self._reference * _CTRL_SCALE
 
-    def _paint(self, look: WorkcellLook) -> None:
-        for i, rgb in enumerate(look.block_rgb):
+    def _paint(self, start: WorkcellStart) -> None:
+        for i, rgb in enumerate(start.block_rgb):
             self.model.geom(f"block{i}").rgba = [*rgb, 1.0]
-        self.model.geom("table").rgba = [*look.table_rgb, 1.0]
+        self.model.geom("table").rgba = [*start.table_rgb, 1.0]
         lamp = self.model.light("lamp")
-        lamp.dir, lamp.diffuse = look.light_dir_w, [look.light] * 3
+        lamp.dir, lamp.diffuse = start.light_dir_w, [start.light] * 3

@@ -1,5 +1,7 @@
 """Birth of parcels: soil that enters the bucket gathers before it, and leaves as whole parcels where it was cut."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -18,28 +20,41 @@ _INSET = 0.9
 _PASSES = 3
 
 
+class Bins(NamedTuple):
+    """Soil that waits before the opening of a bucket, in bins of about one parcel; lengths in the tool frame.
+
+    Attributes:
+        volumes: (a, b) waiting volumes along the opening, from edge to lip, and across it [m3].
+        x: Of the edge [m].
+        z: Of the edge [m].
+        along_x: x of the way from edge to lip over its squared length [1/m].
+        along_z: z of the same [1/m].
+        width: Inner width of the bucket [m].
+    """
+
+    volumes: Array
+    x: float
+    z: float
+    along_x: float
+    along_z: float
+    width: float
+
+
 @kernel
-def gather(
-    volumes: Array,
-    frame: tuple[float, float, float, float, float],
-    x: float,
-    y: float,
-    z: float,
-    volume: float,
-) -> None:
+def gather(bins: Bins, x: float, y: float, z: float, volume: float) -> None:
     """Book a volume in the bin of the opening before which a tool point lies.
 
     Args:
-        volumes: (a, b) waiting volumes along the opening and across it [m3], changed in place.
-        frame: x_t, z_t of the edge, vector to the lip over its squared length, and the width [m].
+        bins: Their volumes are changed in place.
         x: Of the point [m].
         y: The same.
         z: The same.
         volume: To book [m3].
     """
-    share = (x - frame[0]) * frame[2] + (z - frame[1]) * frame[3]
+    volumes = bins.volumes
+    share = (x - bins.x) * bins.along_x + (z - bins.z) * bins.along_z
     i = min(max(int(share * volumes.shape[0]), 0), volumes.shape[0] - 1)
-    j = min(max(int((y / frame[4] + 0.5) * volumes.shape[1]), 0), volumes.shape[1] - 1)
+    j = min(max(int((y / bins.width + 0.5) * volumes.shape[1]), 0), volumes.shape[1] - 1)
     volumes[i, j] += volume
 
 
@@ -80,13 +95,12 @@ class Intake:
         self._edge, self._lip = geometry.profile_t[0], geometry.profile_t[-1]
         across = self._lip - self._edge
         length = float(np.linalg.norm(across))
-        bins = (
+        shape = (
             max(1, round(length / (2 * radius_m))),
             max(1, round(geometry.inner_width_m / (2 * radius_m))),
         )
-        self.volumes: Array = np.zeros(bins)
-        x, z = (float(v) for v in across / length**2)
-        self.frame = (float(self._edge[0]), float(self._edge[1]), x, z, float(geometry.inner_width_m))
+        (x, z), (along_x, along_z) = self._edge.tolist(), (across / length**2).tolist()
+        self.bins = Bins(np.zeros(shape), x, z, along_x, along_z, float(geometry.inner_width_m))
 
     def belongs_to(self, geometry: ToolGeometry) -> bool:
         """Tell whether this is the intake of a bucket of that shape."""
@@ -95,22 +109,22 @@ class Intake:
     @property
     def waiting_m3(self) -> float:
         """Volume that has entered the bucket and is not yet a parcel."""
-        return max(0.0, float(self.volumes.sum()))
+        return max(0.0, float(self.bins.volumes.sum()))
 
     def clear(self) -> None:
         """Forget what waits."""
-        self.volumes[:] = 0.0
+        self.bins.volumes[:] = 0.0
 
     def births(self, parcel_m3: float, rng: Generator) -> Array:
         """Take whole parcels out of the bins; return where they begin, (n, 3) in the tool frame [m]."""
-        count = int(self.waiting_m3 / parcel_m3)
+        count, volumes = int(self.waiting_m3 / parcel_m3), self.bins.volumes
         points = np.zeros((count, 3))
         for k in range(count):
-            i, j = np.unravel_index(int(np.argmax(self.volumes)), self.volumes.shape)
-            self.volumes[i, j] -= parcel_m3
-            share = ((i + 0.5) / self.volumes.shape[0], (j + 0.5) / self.volumes.shape[1])
-            x, z = self._edge + share[0] * (self._lip - self._edge)
-            points[k] = x, (share[1] - 0.5) * self.geometry.inner_width_m, z
+            i, j = np.unravel_index(int(np.argmax(volumes)), volumes.shape)
+            volumes[i, j] -= parcel_m3
+            along, across = (i + 0.5) / volumes.shape[0], (j + 0.5) / volumes.shape[1]
+            x, z = self._edge + along * (self._lip - self._edge)
+            points[k] = x, (across - 0.5) * self.geometry.inner_width_m, z
         points += rng.uniform(-_JITTER, _JITTER, points.shape) * self._radius_m
         move_inside(points, self.geometry.planes_t, _INSET * self._radius_m)
         return points

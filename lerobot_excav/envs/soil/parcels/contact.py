@@ -74,9 +74,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @kernel
-def normal_force(
-    overlap: float, separation_speed: float, stiffness: float, impedance: float, radius: float
-) -> float:
+def normal_force(overlap: float, separation_speed: float, stiffness: float, impedance: float, radius: float) -> float:
     """Return the normal force [N] of a contact; it never pulls.
 
     Args:
@@ -86,10 +84,7 @@ def normal_force(
         impedance: Root of stiffness times effective mass [kg/s].
         radius: Radius of the smaller partner [m].
     """
-    force = (
-        stiffness * min(overlap, LARGEST_OVERLAP * radius)
-        - 2.0 * NORMAL_DAMPING * impedance * separation_speed
-    )
+    force = stiffness * min(overlap, LARGEST_OVERLAP * radius) - 2.0 * NORMAL_DAMPING * impedance * separation_speed
     if separation_speed > 0.0:
         force *= max(0.0, 1.0 - separation_speed / SEPARATION_M_S)
     return max(0.0, force)
@@ -188,9 +183,7 @@ def contact(
     stiffness = TANGENTIAL_STIFFNESS * normal_stiffness
     damping = 2.0 * TANGENTIAL_DAMPING * _TANGENTIAL_IMPEDANCE * impedance
     slide = spring_force(springs, row, 0, normal, velocity, stiffness, damping, law.sliding * pressing, dt)
-    roll = spring_force(
-        springs, row, 3, normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt
-    )
+    roll = spring_force(springs, row, 3, normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt)
     # A pull that no overlap can balance would draw light parcels through the ground.
     most = MOST_COHESION * normal_stiffness * LARGEST_OVERLAP * radius
     net = pressing - min(law.cohesion * math.pi * radius * radius, most)

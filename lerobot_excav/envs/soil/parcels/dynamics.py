@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
@@ -106,9 +106,7 @@ def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
             if asleep[i] != asleep[j]:
                 mass = masses[j] if asleep[i] else masses[i]
                 hit = max(hit, -dot(velocity, n))
-            force, roll = contact(
-                springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt
-            )
+            force, roll = contact(springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt)
             torque, rolling_torque = cross(n, force), cross(n, roll)
             for a in range(3):
                 forces[i, a] += force[a]
@@ -169,8 +167,8 @@ def advance(
         The neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
     """
     highest = max(site.heights.max(), site.level_z)
-    if site.box[3] > 0.0:
-        highest = max(highest, site.box[2] + site.box_heights.max())
+    if site.box.half_x > 0.0:
+        highest = max(highest, site.box.floor_z + site.box_heights.max())
     new = find_pairs(state.positions, state.radii, state.asleep, pairs, old_rows, spare)
     pairs, spare = new, pairs
     same_rows = np.arange(len(state.masses))
@@ -187,9 +185,9 @@ def advance(
         state.torques[:] = 0.0
         hit = max(hit, press_pairs(state, pairs, laws.parcel, dt))
         if tool.present:
-            press_bucket(state, step, tool, site.grid[2], laws.steel, dt)
+            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt)
         press_ground(state, site, highest, laws.ground, dt)
-        if site.box[3] > 0.0:
+        if site.box.half_x > 0.0:
             press_box(state, walls, site.box, laws.steel, dt)
         _integrate(state, dt)
     if tool.present:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
 from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
-from lerobot_excav.envs.soil.parcels.plates import BoxNumbers, to_box
+from lerobot_excav.envs.soil.parcels.plates import BoxWalls, to_box
 from lerobot_excav.envs.soil.parcels.store import (
     SHELTERED,
     TOUCHES_BOX_FLOOR,
@@ -44,7 +44,7 @@ class Site(NamedTuple):
     grid: Grid
     box_heights: Array
     box_grid: Grid
-    box: BoxNumbers
+    box: BoxWalls
     level_z: float
 
 
@@ -52,25 +52,25 @@ class Site(NamedTuple):
 def _surface(heights: Array, grid: Grid, x: float, y: float) -> tuple[float, float, float]:
     """Return height and slopes of the bilinear surface through the cell centres; level beyond the outer ones."""
     nx, ny = heights.shape
-    u = min(max((x - grid[0]) / grid[2], 0.0), nx - 1.0)
-    v = min(max((y - grid[1]) / grid[3], 0.0), ny - 1.0)
+    u = min(max((x - grid.x0) / grid.dx, 0.0), nx - 1.0)
+    v = min(max((y - grid.y0) / grid.dy, 0.0), ny - 1.0)
     i, j = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0))
     k, m = min(i + 1, nx - 1), min(j + 1, ny - 1)
     a, b = u - i, v - j
     along_x = (heights[k, j] - heights[i, j]) * (1.0 - b) + (heights[k, m] - heights[i, m]) * b
     along_y = (heights[i, m] - heights[i, j]) * (1.0 - a) + (heights[k, m] - heights[k, j]) * a
     height = (heights[i, j] * (1.0 - b) + heights[i, m] * b) + a * along_x
-    return height, along_x / grid[2], along_y / grid[3]
+    return height, along_x / grid.dx, along_y / grid.dy
 
 
 @kernel
 def ground_below(site: Site, x: float, y: float) -> tuple[int, float, Vector]:
     """Return what lies below a point, its height there [m] and its unit normal."""
     u, v = to_box(site.box, x, y)
-    if abs(u) < site.box[3] and abs(v) < site.box[4]:
+    if abs(u) < site.box.half_x and abs(v) < site.box.half_y:
         h, su, sv = _surface(site.box_heights, site.box_grid, u, v)
-        place, h = TOUCHES_BOX_FLOOR, h + site.box[2]
-        sx, sy = site.box[6] * su - site.box[7] * sv, site.box[7] * su + site.box[6] * sv
+        place, h = TOUCHES_BOX_FLOOR, h + site.box.floor_z
+        sx, sy = site.box.cos * su - site.box.sin * sv, site.box.sin * su + site.box.cos * sv
     elif in_grid(site.heights, site.grid, x, y):
         h, sx, sy = _surface(site.heights, site.grid, x, y)
         place = TOUCHES_GROUND

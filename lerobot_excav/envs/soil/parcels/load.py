@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.contact import cross
 from lerobot_excav.envs.soil.parcels.dynamics import WAKING_SPEED_M_S
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, inside_depth

@@ -105,9 +105,7 @@ def _more_room(pairs: Pairs) -> Pairs:
     first[: room // 2], second[: room // 2] = pairs.first, pairs.second
     partner, closed = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.uint8)
     springs = np.zeros((room, SPRINGS))
-    return Pairs(
-        pairs.start, partner, closed, springs, pairs.anchors, first, second, pairs.last, pairs.before
-    )
+    return Pairs(pairs.start, partner, closed, springs, pairs.anchors, first, second, pairs.last, pairs.before)
 
 
 @kernel
@@ -183,23 +181,15 @@ def find_pairs(
     new.closed[:count] = 0
     new.springs[:count] = 0.0
     new.anchors[:n] = positions
-    _remember(
-        old_rows,
-        (old.start, old.partner, old.closed, old.springs),
-        (new.start, new.partner, new.closed, new.springs),
-    )
+    _remember(old_rows, old, new)
     return new
 
 
 @kernel
-def _remember(
-    old_rows: Indices,
-    old: tuple[Indices, Indices, NDArray[np.uint8], Array],
-    new: tuple[Indices, Indices, NDArray[np.uint8], Array],
-) -> None:
+def _remember(old_rows: Indices, old: Pairs, new: Pairs) -> None:
     """Copy the memory of closed contacts from the old list."""
-    old_start, old_partner, old_closed, old_springs = old
-    start, partner, closed, springs = new
+    old_start, old_partner, old_closed, old_springs = old.start, old.partner, old.closed, old.springs
+    start, partner, closed, springs = new.start, new.partner, new.closed, new.springs
     for i in range(len(old_rows)):
         row = old_rows[i]
         if row < 0:

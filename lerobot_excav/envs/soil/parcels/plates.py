@@ -12,10 +12,6 @@ from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross,
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 
 Array = NDArray[np.float64]
-BoxNumbers = tuple[float, float, float, float, float, float, float, float]
-"""A container as kernels take it: centre x, y, floor z, half lengths, wall top z, cos and sin of its yaw."""
-
-NO_BOX: BoxNumbers = (0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 1.0, 0.0)
 
 CLOSEST = 0.25
 """Share of its radius to which a parcel's centre may come near to a plate; there it is put back."""
@@ -24,6 +20,33 @@ LARGEST_APPROACH = 0.8
 """Share of its distance from a plate that a parcel may come nearer within a sub-step, so that none passes through."""
 
 _HAIR_M = 1e-9
+
+
+class BoxWalls(NamedTuple):
+    """A target box; z counts from the rigid floor.
+
+    Attributes:
+        x: Centre of its floor along x [m].
+        y: The same along y [m].
+        floor_z: Height of its floor [m].
+        half_x: Half of its inner length along its own x [m]; below zero without a box.
+        half_y: The same along its own y [m].
+        top_z: Height of the top of its walls [m].
+        cos: Cosine of its yaw.
+        sin: Sine of its yaw.
+    """
+
+    x: float
+    y: float
+    floor_z: float
+    half_x: float
+    half_y: float
+    top_z: float
+    cos: float
+    sin: float
+
+
+NO_BOX = BoxWalls(0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 1.0, 0.0)
 
 
 class ToolPath(NamedTuple):
@@ -220,14 +243,14 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
 
 
 @kernel
-def to_box(box: BoxNumbers, x: float, y: float) -> tuple[float, float]:
+def to_box(box: BoxWalls, x: float, y: float) -> tuple[float, float]:
     """Turn a world point into the plane of the container."""
-    a, b = x - box[0], y - box[1]
-    return box[6] * a + box[7] * b, -box[7] * a + box[6] * b
+    a, b = x - box.x, y - box.y
+    return box.cos * a + box.sin * b, -box.sin * a + box.cos * b
 
 
 @kernel
-def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) -> None:
+def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> None:
     """Add the forces of the four walls of the target box on the awake parcels.
 
     Args:
@@ -242,30 +265,28 @@ def press_box(state: State, first: int, box: BoxNumbers, law: Law, dt: float) ->
     springs = state.plate_springs.reshape((-1, SPRINGS))
     for i in range(len(state.masses)):
         r, z = state.radii[i], positions[i, 2]
-        if state.asleep[i] or z > box[5] + 2.0 * r:  # 1 r more: see to old contacts
+        if state.asleep[i] or z > box.top_z + 2.0 * r:  # 1 r more: see to old contacts
             continue
         u, v = to_box(box, positions[i, 0], positions[i, 1])
-        if abs(u) > box[3] + 2.0 * r or abs(v) > box[4] + 2.0 * r:
+        if abs(u) > box.half_x + 2.0 * r or abs(v) > box.half_y + 2.0 * r:
             continue
         for wall in range(4):
             row = i * plates + first + wall
             sign = 1.0 if wall % 2 == 0 else -1.0
             if wall < 2:
-                cu, cv = sign * box[3], min(max(v, -box[4]), box[4])
+                cu, cv = sign * box.half_x, min(max(v, -box.half_y), box.half_y)
             else:
-                cu, cv = min(max(u, -box[3]), box[3]), sign * box[4]
-            du, dv, dz = u - cu, v - cv, z - min(z, box[5])
+                cu, cv = min(max(u, -box.half_x), box.half_x), sign * box.half_y
+            du, dv, dz = u - cu, v - cv, z - min(z, box.top_z)
             gap = math.sqrt(du * du + dv * dv + dz * dz)
             if gap >= r or gap < _HAIR_M:
                 forget(springs, row)
                 continue
-            normal = ((box[6] * du - box[7] * dv) / gap, (box[7] * du + box[6] * dv) / gap, dz / gap)
+            normal = ((box.cos * du - box.sin * dv) / gap, (box.sin * du + box.cos * dv) / gap, dz / gap)
             velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
             velocity = keep_out(positions, velocities, i, normal, gap, r, velocity, dt)
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-            force, torque = wall_contact(
-                springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt
-            )
+            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt)
             for a in range(3):
                 state.forces[i, a] += force[a]
                 state.torques[i, a] += torque[a]

@@ -82,12 +82,7 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
 
     def _start(self, scene_id: int, target_id: int) -> None:
         scene = draw_scene(self.settings.scene_set, scene_id)
-        self.workcell.reset(
-            joint_pos=scene.joint_pos,
-            block_pos_w=scene.block_pos_w,
-            block_yaw=scene.block_yaw,
-            look=scene.look,
-        )
+        self.workcell.reset(scene)
         self._scene, self._grasp = scene, GraspTask(self.workcell, target_id)
         self._start_pixels: NDArray[np.bool_] | None = None
 

@@ -19,14 +19,12 @@ class GraspRecord(EpisodeRecord):
     Attributes:
         episode_return: Sum of the rewards.
         first_grasped_block: First block that the fingers lifted since the last command; -1 if they lifted none.
-        shown_block: Block whose mask was shown, noise aside; -1 if the mask showed none, None if there was no mask.
         target_in_tray: Whether the commanded block rests in the tray.
         blocks_in_tray: How many blocks do.
     """
 
     episode_return: float
     first_grasped_block: int
-    shown_block: int | None
     target_in_tray: bool
     blocks_in_tray: int
 
@@ -50,9 +48,9 @@ class GraspRecord(EpisodeRecord):
     @property
     def mask_followed(self) -> bool | None:
         """Of episodes that grasped a block and whose mask showed one: whether they are the same."""
-        if not self.has_grasped or self.shown_block in (None, NO_BLOCK):
+        if not self.has_grasped or self.shown_target_id == NO_BLOCK:
             return None
-        return self.first_grasped_block == self.shown_block
+        return self.first_grasped_block == self.shown_target_id
 
     @property
     def placed(self) -> bool | None:
@@ -78,7 +76,7 @@ def grasp_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
 
 def grasp_summary(index: "pd.DataFrame") -> str:
     """Describe the outcomes of an index."""
-    took_target = int((index["first_grasped_block"] == index["target_id"]).sum())
+    took_target = int((index["first_grasped_block"] == index["final_target_id"]).sum())
     return f"first block taken: the commanded one in {took_target} of {len(index)}"
 
 
@@ -102,9 +100,7 @@ GRASP_MEASURES = TaskMeasures(
         Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
         Column(key="episode_return", header="return", kind=Kind.MEAN, field="episode_return"),
         Column(key="grasped", header="grasped any [%]", kind=Kind.RATE, field="has_grasped"),
-        Column(
-            key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"
-        ),
+        Column(key="target_selection", header="target selection [%]", kind=Kind.RATE, field="target_selected"),
         Column(key="mask_followed", header="mask followed [%]", kind=Kind.RATE, field="mask_followed"),
         Column(key="placed", header="placed [%]", kind=Kind.RATE, field="placed"),
         Column(key="first_grasped", header="first grasped", kind=Kind.COUNTS, field="grasped", words=GRASPED),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.constants import HOME_JOINT_POS
-from lerobot_excav.envs.machines.fr5.look import WorkcellLook
+from lerobot_excav.envs.machines.fr5.start import WorkcellStart
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.errors import ExcavError, require, require_choice
 
@@ -31,24 +31,16 @@ BLOCK_COLOURS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class GraspScene:
-    """One starting situation of the work cell. Its arrays are read-only.
+class GraspScene(WorkcellStart):
+    """One starting situation of the work cell; the block with index i is target i.
 
     Attributes:
         scene_set: `train`, `val` or `test`; their random streams are disjoint.
         scene_id: Number within the set.
-        block_pos_w: Centres of the blocks [m], (4, 3), world frame; the block with index i is target i.
-        block_yaw: Turn of the blocks about z [rad], (4,).
-        look: Colours and light; the colours of the blocks are drawn apart from their places.
-        joint_pos: Joint positions of the arm [rad], (6,).
     """
 
     scene_set: str
     scene_id: int
-    block_pos_w: NDArray[np.float64]
-    block_yaw: NDArray[np.float64]
-    look: WorkcellLook
-    joint_pos: NDArray[np.float64]
 
 
 @lru_cache(maxsize=8)
@@ -67,30 +59,19 @@ def draw_scene(scene_set: str, scene_id: int) -> GraspScene:
     # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
     place_rng, look_rng, pose_rng = (np.random.default_rng(s) for s in stream.spawn(3))
-    block_pos_w = _draw_block_pos_w(place_rng)
-    block_yaw = place_rng.uniform(-layout.BLOCK_YAW_RAD, layout.BLOCK_YAW_RAD, size=layout.BLOCK_COUNT)
-    joint_pos = HOME_JOINT_POS + pose_rng.normal(0.0, HOME_SPREAD_RAD, size=HOME_JOINT_POS.shape)
-    look = _draw_look(look_rng)
-    for array in (block_pos_w, block_yaw, joint_pos, look.block_rgb, look.table_rgb, look.light_dir_w):
+    tilt = look_rng.uniform(-0.4, 0.4, size=2)
+    arrays = {
+        "block_pos_w": _draw_block_pos_w(place_rng),
+        "block_yaw": place_rng.uniform(-layout.BLOCK_YAW_RAD, layout.BLOCK_YAW_RAD, size=layout.BLOCK_COUNT),
+        # The colours are drawn apart from the places: only the mask names a block.
+        "block_rgb": look_rng.permutation(BLOCK_COLOURS)[: layout.BLOCK_COUNT],
+        "table_rgb": np.full(3, look_rng.uniform(0.55, 0.8)) + look_rng.uniform(-0.04, 0.04, size=3),
+        "light_dir_w": np.append(tilt, -1.0) / np.linalg.norm(np.append(tilt, -1.0)),
+        "joint_pos": HOME_JOINT_POS + pose_rng.normal(0.0, HOME_SPREAD_RAD, size=HOME_JOINT_POS.shape),
+    }
+    for array in arrays.values():
         array.flags.writeable = False
-    return GraspScene(
-        scene_set=scene_set,
-        scene_id=scene_id,
-        block_pos_w=block_pos_w,
-        block_yaw=block_yaw,
-        look=look,
-        joint_pos=joint_pos,
-    )
-
-
-def _draw_look(rng: np.random.Generator) -> WorkcellLook:
-    tilt = rng.uniform(-0.4, 0.4, size=2)
-    return WorkcellLook(
-        block_rgb=rng.permutation(BLOCK_COLOURS)[: layout.BLOCK_COUNT],
-        table_rgb=np.full(3, rng.uniform(0.55, 0.8)) + rng.uniform(-0.04, 0.04, size=3),
-        light_dir_w=np.append(tilt, -1.0) / np.linalg.norm(np.append(tilt, -1.0)),
-        light=float(rng.uniform(0.5, 0.8)),
-    )
+    return GraspScene(scene_set=scene_set, scene_id=scene_id, light=float(look_rng.uniform(0.5, 0.8)), **arrays)
 
 
 def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -103,6 +84,4 @@ def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
         if distance[np.triu_indices(layout.BLOCK_COUNT, 1)].min() >= layout.BLOCK_SPACING_M:
             height = np.full((layout.BLOCK_COUNT, 1), layout.block_rest_height_m())
             return np.concatenate([xy_w, height], axis=1)
-    raise ExcavError(
-        f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene"
-    )
+    raise ExcavError(f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene")

@@ -48,8 +48,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     Termination: the cycle is complete (bucket emptied into the box). Truncation: the time limit `episode_length`.
 
-    Arguments: those of `MaskedTaskEnv` and, as settings, the fields of `ExcavatorSettings`. `soil` takes a preset's name
-    or `SoilParameters` of one's own.
+    Arguments: those of `MaskedTaskEnv` and, as settings, the fields of `ExcavatorSettings`. `soil` takes the name of a
+    preset or `SoilParameters` of one's own.
     """
 
     TASK = "Scoop-v0"
@@ -95,7 +95,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     def _start(self, scene_id: int, target_id: int) -> None:
         scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)
-        self.worksite.reset(joint_pos=scene.joint_pos, heights_m=scene.heights_m, appearance=scene.appearance)
+        self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:

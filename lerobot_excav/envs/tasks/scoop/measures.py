@@ -63,9 +63,7 @@ def scoop_summary(index: "pd.DataFrame") -> str:
 def _legend(operator: str | None) -> list[str]:
     if operator is None:
         return []
-    return [
-        f"Efficiency: retained mass over the operator's on the same scenes and targets; operator: {operator}."
-    ]
+    return [f"Efficiency: retained mass over the operator's on the same scenes and targets; operator: {operator}."]
 
 
 SCOOP_MEASURES = TaskMeasures(

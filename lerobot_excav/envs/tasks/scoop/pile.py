@@ -56,9 +56,7 @@ def _heaps(
     return np.asarray(np.max(peak - slope * distance, axis=2))
 
 
-def _ripples(
-    rng: np.random.Generator, x_w: NDArray[np.float64], y_w: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _ripples(rng: np.random.Generator, x_w: NDArray[np.float64], y_w: NDArray[np.float64]) -> NDArray[np.float64]:
     """Low waves of a few centimetres, shape (nx, ny) [m]."""
     waves = np.zeros((x_w.size, y_w.size))
     for _ in range(6):
@@ -76,9 +74,7 @@ def _roof(x_w: NDArray[np.float64], y_w: NDArray[np.float64], repose_tan: float)
     return np.asarray(np.maximum(0.0, 0.9 * repose_tan * np.minimum(inset_x[:, None], inset_y[None, :])))
 
 
-def _fill_to_volume(
-    shape: NDArray[np.float64], roof: NDArray[np.float64], column_sum_m: float
-) -> NDArray[np.float64]:
+def _fill_to_volume(shape: NDArray[np.float64], roof: NDArray[np.float64], column_sum_m: float) -> NDArray[np.float64]:
     """Raise or lower the shape until what stands above the floor has the wanted volume (bisection on the level)."""
     low, high = -float(shape.max()), column_sum_m
     for _ in range(80):

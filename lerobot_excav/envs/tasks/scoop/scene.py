@@ -6,9 +6,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.excavator.appearance import Appearance, draw_appearance
+from lerobot_excav.envs.machines.excavator.appearance import draw_appearance
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M
+from lerobot_excav.envs.machines.excavator.worksite import WorksiteStart
 from lerobot_excav.envs.soil import PRESETS, SoilParameters
 from lerobot_excav.envs.tasks.scoop.pile import draw_pile
 from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets
@@ -21,25 +22,19 @@ _PILE_TRIES = 50
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
-    """One starting situation of the worksite.
+class Scene(WorksiteStart):
+    """One starting situation of the worksite, with what can be commanded in it.
 
     Attributes:
         scene_set: `train`, `val` or `test`; their random streams are disjoint.
         scene_id: Number within the set.
         soil: Name of the soil preset, or parameters of one's own.
-        heights_m: Soil above the floor [m], shape (nx, ny).
-        joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
-        appearance: Colours and light.
         targets: The feasible dig regions, indexed by `target_id`.
     """
 
     scene_set: str
     scene_id: int
     soil: str | SoilParameters
-    heights_m: NDArray[np.float64]
-    joint_pos: NDArray[np.float64]
-    appearance: Appearance
     targets: tuple[Target, ...]
 
 
@@ -105,7 +100,8 @@ def _draw_pile_with_targets(
         except TooFewTargetsError:
             continue
     raise ExcavError(
-        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; report this scene"
+        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; take a soil that "
+        "rests steeper, or report this scene if it is a preset"
     )
 
 

@@ -87,19 +87,5 @@ def find_targets(
     raise TooFewTargetsError(f"the pile has no room for {count} dig regions; draw another pile")
 
 
-def target_mask_img(target: Target, terrain_points_w: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Draw the mask of a target: the pixels whose soil surface point lies in the patch.
-
-    Args:
-        target: The dig region.
-        terrain_points_w: Surface point seen by each pixel [m], shape (H, W, 3), NaN where there is no soil.
-
-    Returns:
-        Mask of {0, 255}, shape (H, W, 3), uint8.
-    """
-    inside = target.contains(terrain_points_w)
-    return np.repeat(np.where(inside, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
-
-
 def _target(center_w: NDArray[np.float64]) -> Target:
     return Target(center_w=center_w.copy(), yaw_rad=cylinder_from_world(center_w)[1])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW, axes
+from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 
 HEIGHT, WIDTH = 96, 128
@@ -10,11 +10,9 @@ HEIGHT, WIDTH = 96, 128
 
 def project(pose, points_w):
     """Image coordinates (column, row) of world points at the default image size."""
-    local = (np.atleast_2d(points_w) - pose.position) @ axes(pose)
+    local = (np.atleast_2d(points_w) - pose.position) @ pose.axes
     focal = 0.5 * HEIGHT / np.tan(0.5 * np.radians(pose.fovy_deg))
-    return np.stack(
-        [WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1
-    )
+    return np.stack([WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1)
 
 
 def in_picture(pose, points_w):
@@ -24,7 +22,7 @@ def in_picture(pose, points_w):
 
 @pytest.mark.parametrize("pose", [MAIN, CAB, OVERVIEW])
 def test_camera_axes_are_a_right_handed_frame_that_keeps_up_up(pose):
-    rotation = axes(pose)
+    rotation = pose.axes
     np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
     assert rotation[2, 1] > 0
@@ -45,18 +43,14 @@ def test_main_sees_into_the_target_box():
 
 
 def test_main_sees_the_cab_and_the_tracks():
-    assert in_picture(
-        MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))]
-    )
+    assert in_picture(MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))])
 
 
 def test_overview_sees_the_whole_dig_area_the_box_and_the_raised_boom():
     assert in_picture(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)))
     for height in (0.0, TARGET_BOX.wall_height_m):
         assert in_picture(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, height))
-    assert in_picture(
-        OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))]
-    )
+    assert in_picture(OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))])
 
 
 def test_cab_sees_the_middle_of_the_box_over_its_wall():

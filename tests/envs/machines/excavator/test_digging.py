@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.digging import DiggingResistance
+from lerobot_excav.envs.machines.excavator.digging import JointResistance
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
@@ -90,9 +90,7 @@ def works_of_substeps(machine, resistance, ctrl_at, ticks, renew):
         resistance.apply(data)
         applied = data.qfrc_applied.copy()
         mujoco.mj_step2(model, data)
-        works.append(
-            float(applied @ data.qvel) * const.SUBSTEP_S
-        )  # qvel is what moves the joints in this step
+        works.append(float(applied @ data.qvel) * const.SUBSTEP_S)  # qvel is what moves the joints in this step
     return np.array(works)
 
 
@@ -118,7 +116,7 @@ def test_resistance_takes_energy_in_every_substep(machine):
     machine.reset(REACHED_OUT)
     works = works_of_substeps(
         machine,
-        DiggingResistance(machine.model),
+        JointResistance(machine.model),
         lambda i: REACHED_OUT + 0.3 * np.sin(i / 30.0) * np.array([1.0, 0.5, -1.0, 1.0]),
         50,
         lambda: edge_reaction(machine, [4e4, 5e3, 2e4], friction=0.5),
@@ -135,7 +133,7 @@ def test_no_arrangement_of_soil_gives_energy_to_any_motion(machine, seed):
     amplitude, phase = rng.uniform(-0.5, 0.5, 4), rng.uniform(0.0, 6.3, 4)
     works = works_of_substeps(
         machine,
-        DiggingResistance(machine.model),
+        JointResistance(machine.model),
         lambda i: REACHED_OUT + amplitude * (np.sin(i / 20.0 + phase) - np.sin(phase)),
         10,
         lambda: reaction_of(random_patches(rng, machine)),
@@ -149,7 +147,7 @@ def test_soil_under_a_bucket_that_stands_on_hard_ground_gives_no_energy(machine)
     machine.reset(pose)
     works = works_of_substeps(
         machine,
-        DiggingResistance(machine.model),
+        JointResistance(machine.model),
         lambda i: pose + np.array([0.0, -0.3, -0.2, 0.0]) * min(1.0, i / 200.0),
         60,
         lambda: edge_reaction(machine, [5e3, 0.0, 2e4], friction=0.4),
@@ -163,7 +161,7 @@ def test_soil_under_a_bucket_that_stands_on_hard_ground_gives_no_energy(machine)
 def test_the_prediction_behind_it_is_the_motion_that_mujoco_makes(machine):
     """Stiction is exact only if the solver knows the velocity at the end of the substep."""
     machine.reset(REACHED_OUT)
-    resistance = DiggingResistance(machine.model)
+    resistance = JointResistance(machine.model)
     model, data = machine.model, machine.data
     for i in range(200):
         data.ctrl[:] = REACHED_OUT + 0.002 * i * np.array([0.2, -0.2, -1.0, -1.0])
@@ -179,14 +177,12 @@ def test_a_moving_bucket_feels_the_patch_in_full_where_it_is(machine):
     machine.reset(REACHED_OUT)
     for _ in range(25):
         machine.tick(ARM_IN, edge_reaction(machine, [0.0, 0.0, 0.0]))
-    resistance, data = DiggingResistance(machine.model), machine.data
+    resistance, data = JointResistance(machine.model), machine.data
     resistance.set_reaction(edge_reaction(machine, [1e3, 0.0, 0.0]), data)
     data.qfrc_applied[:] = 0.0
     resistance.apply(data)
     jacobian = np.zeros((3, 4))
-    mujoco.mj_jac(
-        machine.model, data, jacobian, None, machine.cutting_edge_pos_w, machine.model.body("bucket").id
-    )
+    mujoco.mj_jac(machine.model, data, jacobian, None, machine.cutting_edge_pos_w, machine.model.body("bucket").id)
     np.testing.assert_allclose(data.qfrc_applied, jacobian.T @ [1e3, 0.0, 0.0], rtol=1e-9, atol=1e-6)
     np.testing.assert_allclose(resistance.force_w_n, [1e3, 0.0, 0.0], atol=1e-6)
 

@@ -148,9 +148,7 @@ def test_tool_is_the_bucket_now_and_moves_as_it_says(machine):
     moved = (after.position_w - before.position_w) / const.TICK_S
     np.testing.assert_allclose(moved, 0.5 * (before.linear_velocity_w + after.linear_velocity_w), atol=5e-3)
     turned = (after.rotation_w - before.rotation_w) @ before.rotation_w.T / const.TICK_S
-    spin = 0.5 * np.array(
-        [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
-    )
+    spin = 0.5 * np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
     np.testing.assert_allclose(spin, before.angular_velocity_w, atol=0.05)
 
 
@@ -204,9 +202,7 @@ def test_unusable_joint_position_is_refused(machine, joint_pos):
 def test_appearance_changes_colours_and_light_but_no_physics():
     machine = ExcavatorMachine(container=TARGET_BOX)
     before = machine.model.body_mass.copy(), machine.model.geom_size.copy()
-    machine.set_appearance(
-        Appearance(machine_rgb=(0.1, 0.2, 0.3), light_dir_w=(0.0, 0.0, -2.0), light_intensity=0.5)
-    )
+    machine.set_appearance(Appearance(machine_rgb=(0.1, 0.2, 0.3), light_dir_w=(0.0, 0.0, -2.0), light_intensity=0.5))
     np.testing.assert_allclose(machine.model.material("machine").rgba[:3], [0.1, 0.2, 0.3], atol=1e-6)
     np.testing.assert_allclose(machine.model.light("sun").dir, [0.0, 0.0, -1.0])
     np.testing.assert_allclose(machine.model.light("sun").diffuse, 0.5)

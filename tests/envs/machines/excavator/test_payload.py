@@ -67,9 +67,7 @@ def test_load_adds_its_weight_about_every_pin(model, payload):
     com_w = data.body("payload").xipos
     jacobian = np.zeros((3, 4))
     mujoco.mj_jac(model, data, jacobian, None, com_w, model.body("payload").id)
-    np.testing.assert_allclose(
-        loaded - empty, -jacobian.T @ [0, 0, -485.0 * const.GRAVITY_M_S2], rtol=1e-9, atol=1e-6
-    )
+    np.testing.assert_allclose(loaded - empty, -jacobian.T @ [0, 0, -485.0 * const.GRAVITY_M_S2], rtol=1e-9, atol=1e-6)
 
 
 def test_load_adds_to_the_inertia_of_the_swing(model, payload):

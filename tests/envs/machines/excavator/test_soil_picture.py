@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP
-from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture, _resampled
@@ -95,9 +95,7 @@ def test_a_load_is_a_skin_that_hides_the_parcels_below_it(machine, picture, soil
     places_t = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     picture.update(soil_with_parcels(in_bucket(machine, places_t), is_load=[True] * len(places_t)))
     assert drawn(machine, "load")
-    depths = (
-        skin(machine, "grains_0").reshape(-1, 3) - machine.tool().position_w
-    ) @ machine.tool().rotation_w
+    depths = (skin(machine, "grains_0").reshape(-1, 3) - machine.tool().position_w) @ machine.tool().rotation_w
     assert depths[:, 2].max() < 0.2
 
 

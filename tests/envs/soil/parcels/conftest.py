@@ -1,20 +1,20 @@
 """Small worlds of parcels: makers of states, tools and sites for the tests of this directory."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.soil.benchmark import BUCKET, rotation_at
+from bench.soil import BUCKET, rotation_at
+from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.motion import Pose, path
 from lerobot_excav.envs.soil.parcels.contact import Law
-from lerobot_excav.envs.soil.parcels.dynamics import Laws
+from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
 from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.pairs import room_for
 from lerobot_excav.envs.soil.parcels.plates import NO_BOX, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Population
-from lerobot_excav.envs.soil.parcels.store import WALLS, State, empty_state
+from lerobot_excav.envs.soil.parcels.store import WALLS, empty_state
 
 RADIUS = 0.045
 MASS = 0.94
@@ -24,15 +24,15 @@ PLATES = len(BUCKET.profile_t) + 1 + WALLS
 
 
 @pytest.fixture(scope="session")
-def laws() -> Laws:
+def laws():
     return Laws(Law(STIFFNESS, 0.5, 0.3, 0.0), Law(STIFFNESS, 0.97, 0.6, 0.0), Law(STIFFNESS, 0.49, 0.3, 0.0))
 
 
 @pytest.fixture(scope="session")
-def make_state() -> Callable[..., State]:
+def make_state():
     """Return a maker of parcels from positions (n, 3) and any other array of a state by name."""
 
-    def make(positions: Any, **arrays: Any) -> State:
+    def make(positions, **arrays):
         state = empty_state(len(positions), PLATES)
         state.positions[:] = positions
         state.radii[:] = RADIUS
@@ -45,10 +45,10 @@ def make_state() -> Callable[..., State]:
 
 
 @pytest.fixture(scope="session")
-def random_state(make_state: Callable[..., State]) -> Callable[..., State]:
+def random_state(make_state):
     """Return a maker of n parcels of different sizes that move and spin in a box of some size."""
 
-    def make(rng: np.random.Generator, count: int, half_size: Any, centre: Any = (0.0, 0.0, 0.0)) -> State:
+    def make(rng, count, half_size, centre=(0.0, 0.0, 0.0)):
         radii = RADIUS * rng.uniform(0.7, 1.4, count)
         return make_state(
             np.asarray(centre) + rng.uniform(-1.0, 1.0, (count, 3)) * half_size,
@@ -62,17 +62,10 @@ def random_state(make_state: Callable[..., State]) -> Callable[..., State]:
 
 
 @pytest.fixture(scope="session")
-def tool_path() -> Callable[..., ToolPath]:
+def tool_path():
     """Return a maker of a bucket's path from one position and pitch to another in some steps."""
 
-    def make(
-        position: Any = (0.0, 0.0, 0.0),
-        pitch: float = math.pi,
-        travel: Any = (0.0, 0.0, 0.0),
-        turn: float = 0.0,
-        steps: int = 1,
-        dt: float = DT,
-    ) -> ToolPath:
+    def make(position=(0.0, 0.0, 0.0), pitch=math.pi, travel=(0.0, 0.0, 0.0), turn=0.0, steps=1, dt=DT):
         start = np.asarray(position, dtype=np.float64)
         before = Pose(position=start, rotation=rotation_at(pitch))
         now = Pose(position=start + np.asarray(travel), rotation=rotation_at(pitch + turn))
@@ -93,32 +86,50 @@ def tool_path() -> Callable[..., ToolPath]:
 
 
 @pytest.fixture(scope="session")
-def no_tool(tool_path: Callable[..., ToolPath]) -> Callable[[int], ToolPath]:
+def no_tool(tool_path):
     """Return a maker of the absence of a bucket for some sub-steps."""
     return lambda steps: tool_path(steps=steps)._replace(present=0)
 
 
 @pytest.fixture(scope="session")
-def site() -> Callable[..., Site]:
+def site():
     """Return a maker of level ground of some height, 6 m x 6 m, with or without a box."""
 
-    def make(height: float = 0.0, heights: Any = None, box: Any = NO_BOX, box_heights: Any = None) -> Site:
+    def make(height=0.0, heights=None, box=NO_BOX, box_heights=None):
         cells = np.full((60, 60), height) if heights is None else np.asarray(heights, dtype=np.float64)
         cell = 6.0 / len(cells)
-        first = -0.5 * (len(cells) - 1) * cell
         inside = np.zeros((8, 6)) if box_heights is None else box_heights
-        size = 2.0 * box[3] / inside.shape[0], 2.0 * box[4] / inside.shape[1]
-        box_grid = (-box[3] + 0.5 * size[0], -box[4] + 0.5 * size[1], *size)
-        return Site(cells, (first, first, cell, cell), inside, box_grid, box, height)
+        size = 2.0 * box.half_x / inside.shape[0], 2.0 * box.half_y / inside.shape[1]
+        return Site(
+            cells,
+            Grid.centred(cells.shape, cell, cell),
+            inside,
+            Grid.centred(inside.shape, *size),
+            box,
+            height,
+        )
 
     return make
 
 
 @pytest.fixture(scope="session")
-def make_population(laws: Laws) -> Callable[..., Population]:
+def make_population(laws):
     """Return a maker of empty populations."""
 
-    def make(most_awake: int = 1000, laws: Laws = laws) -> Population:
+    def make(most_awake=1000, laws=laws):
         return Population(PLATES, laws, RADIUS, MASS, most_awake)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def run(no_tool, site, laws):
+    """Return what advances a state by some sub-steps in one call and tells the fastest hit on a sleeping parcel."""
+
+    def run(state, steps, ground=None, tool=None, laws=laws):
+        count = len(state.masses)
+        new = np.full(count, -1, dtype=np.int64)
+        world = (tool or no_tool(steps), ground or site(), laws)
+        return advance(state, room_for(count), room_for(count), new, *world, DT, steps)[2]
+
+    return run

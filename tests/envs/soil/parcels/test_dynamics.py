@@ -1,56 +1,36 @@
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.parameters import GRAVITY_M_S2
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.contact import LARGEST_OVERLAP, SEPARATION_M_S, Law
-from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, Laws, advance
-from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, advance
 from lerobot_excav.envs.soil.parcels.pairs import room_for
-from lerobot_excav.envs.soil.parcels.plates import BoxNumbers, ToolPath
+from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from lerobot_excav.envs.soil.parcels.store import State
-from lerobot_excav.envs.soil.reference import motion as reference
-from lerobot_excav.envs.soil.reference.plates import bucket_polygons, nearest_point
+from validation.soil.reference import motion as reference
+from validation.soil.reference.plates import bucket_polygons, nearest_point
 
 RADIUS = 0.045
 MASS = 0.94
 DT = 0.001
 STIFFNESS = MASS * (0.2 / DT) ** 2
-BOX: BoxNumbers = (0.4, 0.1, 0.0, 0.5, 0.4, 0.5, math.cos(0.3), math.sin(0.3))
+BOX = BoxWalls(0.4, 0.1, 0.0, 0.5, 0.4, 0.5, math.cos(0.3), math.sin(0.3))
 WEIGHT = np.array([0.0, 0.0, -GRAVITY_M_S2])
 
-MakeState, MakeTool, MakeSite = Callable[..., State], Callable[..., ToolPath], Callable[..., Site]
-NoTool = Callable[[int], ToolPath]
 
-
-def run(state: State, tool: ToolPath, site: Site, laws: Laws, steps: int) -> float:
-    """Advance a state by some sub-steps as one call; return the fastest hit on a sleeping parcel."""
-    count = len(state.masses)
-    none = np.full(count, -1, dtype=np.int64)
-    return advance(state, room_for(count), room_for(count), none, tool, site, laws, DT, steps)[2]
-
-
-def energy(state: State) -> float:
+def energy(state):
     spinning = 0.4 * state.masses * state.radii**2 * (state.spins**2).sum(axis=1)
     moving = state.masses * (state.velocities**2).sum(axis=1)
     return float(0.5 * (moving + spinning).sum() + GRAVITY_M_S2 * state.masses @ state.positions[:, 2])
 
 
 @given(seed=st.integers(0, 2**16), cohesion=st.sampled_from([0.0, 2100.0]), has_tool=st.booleans())
-@settings(max_examples=25, deadline=None)
-def test_sub_steps_are_those_of_the_reference(
-    random_state: MakeState,
-    tool_path: MakeTool,
-    site: MakeSite,
-    laws: Laws,
-    seed: int,
-    cohesion: float,
-    has_tool: bool,  # noqa: FBT001
-) -> None:
+@settings(max_examples=25)
+def test_sub_steps_are_those_of_the_reference(random_state, tool_path, site, laws, run, seed, cohesion, has_tool):
     """A crowd in a moving bucket above a box and rough ground: all contacts at once."""
     rng, steps = np.random.default_rng(seed), 8
     laws = laws._replace(parcel=laws.parcel._replace(cohesion=cohesion))
@@ -61,67 +41,50 @@ def test_sub_steps_are_those_of_the_reference(
         state.asleep[:] = rng.random(16) < 0.25
         state.places_t[:] = (state.positions - tool.positions[0]) @ tool.rotations[0]
     twin, memory = State(*(array.copy() for array in state)), {}
-    hit = run(state, tool, ground, laws, steps)
+    hit = run(state, steps, ground, tool, laws)
     expected = reference.advance(twin, memory, tool, ground, laws, DT, steps)
     for name in ("positions", "velocities", "spins", "ground_springs", "plate_springs"):
-        np.testing.assert_allclose(
-            getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name
-        )
+        np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_array_equal(state.ground, twin.ground)
     np.testing.assert_array_equal(state.shell, twin.shell)
     assert hit == pytest.approx(expected, abs=1e-9)
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=30, deadline=None)
-def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mass(
-    random_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, seed: int
-) -> None:
+@settings(max_examples=30)
+def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mass(random_state, run, seed):
     """Angular momentum holds to first order: positions move between the forces of two sub-steps."""
     state = random_state(np.random.default_rng(seed), 10, 0.08, centre=(0.0, 0.0, 50.0))
     total = state.masses.sum()
 
-    def about_centre() -> np.ndarray:
+    def about_centre():
         arms = state.positions - state.masses @ state.positions / total
         orbits = np.cross(arms, state.masses[:, None] * (state.velocities - momentum() / total))
         own = 0.4 * (state.masses * state.radii**2)[:, None] * state.spins
         return np.asarray((orbits + own).sum(axis=0))
 
-    def momentum() -> np.ndarray:
+    def momentum():
         return np.asarray(state.masses @ state.velocities)
 
     before, turning, scale = momentum(), about_centre(), np.abs(state.spins).sum() * MASS * RADIUS**2
-    run(state, no_tool(40), site(), laws, 40)
+    run(state, 40)
     np.testing.assert_allclose(momentum(), before + total * WEIGHT * 40 * DT, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(about_centre(), turning, atol=1e-9 * scale + 1e-9)
 
 
-def test_a_parcel_falls_by_semi_implicit_euler(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws
-) -> None:
-    state = make_state([[0.0, 0.0, 10.0]], velocities=[[1.0, -2.0, 3.0]])
-    run(state, no_tool(200), site(), laws, 200)
-    time = 200 * DT
-    np.testing.assert_allclose(state.velocities[0], np.array([1.0, -2.0, 3.0]) + WEIGHT * time, atol=1e-12)
-    fallen = 0.5 * WEIGHT * time * (time + DT)
-    np.testing.assert_allclose(state.positions[0], np.array([0.2, -0.4, 10.6]) + fallen, atol=1e-12)
-
-
-def test_no_parcel_is_faster_than_the_limit(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws
-) -> None:
+def test_no_parcel_is_faster_than_the_limit(make_state, run):
     state = make_state([[0.0, 0.0, 100.0]], velocities=[[0.0, 0.0, -11.9]])
-    run(state, no_tool(100), site(), laws, 100)
+    run(state, 100)
     assert np.linalg.norm(state.velocities[0]) == pytest.approx(LARGEST_SPEED_M_S)
 
 
-def sloping(site: MakeSite, angle: float) -> Site:
+def sloping(site, angle):
     """Return a plane that falls along x, 6 m long."""
     x = np.linspace(-2.95, 2.95, 60)
     return site(heights=np.repeat((3.0 - x * math.tan(angle))[:, None], 60, axis=1))
 
 
-def on_slope(make_state: MakeState, angle: float) -> State:
+def on_slope(make_state, angle):
     """Return a parcel that lies on the plane, at its upper part."""
     foot = np.array([-2.0, 0.0, 3.0 + 2.0 * math.tan(angle)])
     normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
@@ -129,41 +92,37 @@ def on_slope(make_state: MakeState, angle: float) -> State:
 
 
 @pytest.mark.parametrize("friction_deg", [20.0, 35.0])
-def test_a_parcel_that_cannot_roll_sticks_below_the_friction_angle(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, friction_deg: float
-) -> None:
+def test_a_parcel_that_cannot_roll_sticks_below_the_friction_angle(make_state, site, laws, run, friction_deg):
     angle = math.radians(friction_deg - 1.0)
     law = Law(STIFFNESS, math.tan(math.radians(friction_deg)), 10.0, 0.0)
     state = on_slope(make_state, angle)
     start = state.positions.copy()
-    run(state, no_tool(1000), sloping(site, angle), laws._replace(ground=law), 1000)
+    run(state, 1000, sloping(site, angle), laws=laws._replace(ground=law))
     assert np.abs(state.positions - start).max() < 0.006  # the springs of sliding and rolling stretch
     assert np.linalg.norm(state.velocities[0]) < 1e-3
 
 
 @pytest.mark.parametrize("friction_deg", [20.0, 35.0])
 def test_a_parcel_that_cannot_roll_slides_above_the_friction_angle_as_coulomb_says(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, friction_deg: float
-) -> None:
+    make_state, site, laws, run, friction_deg
+):
     angle = math.radians(friction_deg + 2.0)
     law = Law(STIFFNESS, math.tan(math.radians(friction_deg)), 10.0, 0.0)
     state, speeds = on_slope(make_state, angle), []
     for _ in range(2):
-        run(state, no_tool(400), sloping(site, angle), laws._replace(ground=law), 400)
+        run(state, 400, sloping(site, angle), laws=laws._replace(ground=law))
         speeds.append(float(np.linalg.norm(state.velocities[0])))
     pull = GRAVITY_M_S2 * (math.sin(angle) - law.sliding * math.cos(angle))
     assert speeds[1] - speeds[0] == pytest.approx(0.4 * pull, rel=0.02)
 
 
 @pytest.mark.parametrize("rolling", [0.2, 0.5])
-def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, rolling: float
-) -> None:
+def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(make_state, site, laws, run, rolling):
     law = Law(STIFFNESS, 2.0, rolling, 0.0)
     moved = []
     for angle in (math.atan(rolling) - 0.02, math.atan(rolling) + 0.05):
         moved.append(on_slope(make_state, angle))
-        run(moved[-1], no_tool(800), sloping(site, angle), laws._replace(ground=law), 800)
+        run(moved[-1], 800, sloping(site, angle), laws=laws._replace(ground=law))
     below, above = moved
     assert np.linalg.norm(below.velocities[0]) < 1e-3
     speed = float(np.linalg.norm(above.velocities[0]))
@@ -172,9 +131,7 @@ def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(
 
 
 @pytest.mark.parametrize("rolling", [0.1, 0.3])
-def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, rolling: float
-) -> None:
+def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(make_state, laws, run, rolling):
     """7/10 m v^2 is used up by the force mu_r m g along the way."""
     speed = 1.0
     state = make_state(
@@ -182,44 +139,36 @@ def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(
         velocities=[[speed, 0.0, 0.0]],
         spins=[[0.0, speed / RADIUS, 0.0]],
     )
-    run(state, no_tool(2000), site(), laws._replace(ground=Law(STIFFNESS, 1.0, rolling, 0.0)), 2000)
+    run(state, 2000, laws=laws._replace(ground=Law(STIFFNESS, 1.0, rolling, 0.0)))
     assert np.linalg.norm(state.velocities[0]) < 1e-3
     way = 0.7 * speed**2 / (rolling * GRAVITY_M_S2)
     assert state.positions[0, 0] + 2.0 == pytest.approx(way, rel=0.1)
 
 
-def pyramid(make_state: MakeState, layers: int = 3) -> State:
+def pyramid(make_state, layers=3):
     """Return a square pyramid of spheres that just touch."""
     points = []
     for level in range(layers):
         width = layers - level
         start = -(width - 1) * RADIUS
         height = RADIUS + level * RADIUS * math.sqrt(2.0)
-        points += [
-            (start + 2 * RADIUS * i, start + 2 * RADIUS * j, height)
-            for i in range(width)
-            for j in range(width)
-        ]
+        points += [(start + 2 * RADIUS * i, start + 2 * RADIUS * j, height) for i in range(width) for j in range(width)]
     return make_state(points)
 
 
-def test_a_stack_stays_at_rest_and_its_energy_does_not_grow(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws
-) -> None:
+def test_a_stack_stays_at_rest_and_its_energy_does_not_grow(make_state, run):
     state = pyramid(make_state)
-    run(state, no_tool(500), site(), laws, 500)  # it sinks into its springs
+    run(state, 500)  # it sinks into its springs
     rest, energies = state.positions.copy(), [energy(state)]
     for _ in range(20):
-        run(state, no_tool(100), site(), laws, 100)
+        run(state, 100)
         energies.append(energy(state))
     assert np.abs(state.positions - rest).max() < 0.02 * RADIUS
     assert np.linalg.norm(state.velocities, axis=1).max() < 0.01
     assert max(energies) <= energies[0] + 1e-4
 
 
-def test_what_contacts_remember_outlives_new_lists_of_neighbours(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, rng: np.random.Generator
-) -> None:
+def test_what_contacts_remember_outlives_new_lists_of_neighbours(make_state, no_tool, site, laws, rng):
     """Two sticky lumps fly past each other: the list is made anew again and again, their contacts stay closed.
 
     The twin has no list: it looks at all pairs and forgets only what opens.
@@ -247,48 +196,17 @@ def test_what_contacts_remember_outlives_new_lists_of_neighbours(
 
 
 @pytest.mark.parametrize("cohesion", [1000.0, 1400.0, 1500.0, 2100.0])
-def test_cohesion_holds_a_hanging_parcel_up_to_its_limit(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, cohesion: float
-) -> None:
+def test_cohesion_holds_a_hanging_parcel_up_to_its_limit(make_state, laws, run, cohesion):
     limit = cohesion * math.pi * RADIUS**2
     overlap = max(0.0, limit - MASS * GRAVITY_M_S2) / STIFFNESS
     state = make_state([[0.0, 0.0, 2.0], [0.0, 0.0, 2.0 - 2 * RADIUS + overlap + 1e-6]])
     state.asleep[0] = 1  # it is held
-    run(state, no_tool(500), site(), laws._replace(parcel=laws.parcel._replace(cohesion=cohesion)), 500)
+    run(state, 500, laws=laws._replace(parcel=laws.parcel._replace(cohesion=cohesion)))
     hangs = abs(state.positions[1, 2] - (2.0 - 2 * RADIUS + overlap)) < 1e-4
     assert hangs == (limit > MASS * GRAVITY_M_S2)
 
 
-def test_sleeping_parcels_move_with_the_bucket_as_one_body(
-    random_state: MakeState, tool_path: MakeTool, site: MakeSite, laws: Laws, rng: np.random.Generator
-) -> None:
-    steps = 20
-    tool = tool_path((0.2, 0.1, 2.0), -3.0, [0.03, 0.02, 0.05], 0.1, steps)
-    state = random_state(rng, 10, 0.1, centre=tool.positions[0] + tool.rotations[0] @ [0.6, 0.0, 0.2])
-    state.asleep[:] = 1
-    state.places_t[:] = (state.positions - tool.positions[0]) @ tool.rotations[0]
-    run(state, tool, site(), laws, steps)
-    placed = tool.positions[-1] + state.places_t @ tool.rotations[-1].T
-    np.testing.assert_allclose(state.positions, placed, atol=1e-12)
-    arms = placed - tool.positions[-1]
-    np.testing.assert_allclose(state.velocities, tool.linear + np.cross(tool.angular, arms), atol=1e-12)
-    np.testing.assert_allclose(state.spins, np.tile(tool.angular, (10, 1)), atol=1e-12)
-
-
-@pytest.mark.parametrize("speed", [0.1, 2.0])
-def test_a_hit_on_a_sleeping_parcel_is_reported_with_its_speed(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, speed: float
-) -> None:
-    state = make_state(
-        [[0.0, 0.0, 1.0], [2.05 * RADIUS, 0.0, 1.0]], velocities=[[0.0] * 3, [-speed, 0.0, 0.0]]
-    )
-    state.asleep[0] = 1
-    steps = math.ceil(0.06 * RADIUS / speed / DT) + 1
-    assert run(state, no_tool(steps), site(), laws, steps) == pytest.approx(speed, rel=0.1)
-    np.testing.assert_array_equal(state.positions[0], [0.0, 0.0, 1.0])
-
-
-def crosses(polygon: np.ndarray, start: np.ndarray, end: np.ndarray) -> bool:
+def crosses(polygon, start, end):
     """Tell whether a straight way crosses a convex polygon."""
     normal = np.cross(polygon[1] - polygon[0], polygon[2] - polygon[0])
     before, after = (start - polygon[0]) @ normal, (end - polygon[0]) @ normal
@@ -300,25 +218,19 @@ def crosses(polygon: np.ndarray, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=12, deadline=None)
-def test_no_parcel_passes_a_plate_at_the_largest_speed(
-    make_state: MakeState, tool_path: MakeTool, site: MakeSite, laws: Laws, seed: int
-) -> None:
+@settings(max_examples=12)
+def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, run, seed):
     """Thrown at the bucket from all sides, while that moves as fast as sub-steps allow."""
     rng, steps, count = np.random.default_rng(seed), 25, 40
     way = rng.normal(0.0, 1.0, 3)
     travel = steps * 0.2 * RADIUS * way / np.linalg.norm(way)
     whole = tool_path((0.0, 0.0, 5.0), rng.uniform(-3.1, 3.1), travel, 0.0, steps)
     plates = bucket_polygons(whole)
-    aims = np.array(
-        [rng.dirichlet(np.ones(len(p))) @ p for p in (plates[k % len(plates)] for k in range(count))]
-    )
+    aims = np.array([rng.dirichlet(np.ones(len(p))) @ p for p in (plates[k % len(plates)] for k in range(count))])
     flight = rng.normal(0.0, 1.0, (count, 3))
     flight /= np.linalg.norm(flight, axis=1)[:, None]
     starts = aims - rng.uniform(1.0, 3.0, (count, 1)) * RADIUS * flight
-    keep = [
-        min(np.linalg.norm(q - nearest_point(plate, q)) for plate in plates) > 0.5 * RADIUS for q in starts
-    ]
+    keep = [min(np.linalg.norm(q - nearest_point(plate, q)) for plate in plates) > 0.5 * RADIUS for q in starts]
     rotation = whole.rotations[0]
     state = make_state(
         whole.positions[0] + starts[keep] @ rotation.T,
@@ -327,17 +239,17 @@ def test_no_parcel_passes_a_plate_at_the_largest_speed(
     for step in range(steps):
         tool = whole._replace(positions=whole.positions[step : step + 2], rotations=whole.rotations[:2])
         before = (state.positions - tool.positions[0]) @ rotation
-        run(state, tool, site(), laws, 1)
+        run(state, 1, tool=tool)
         after = (state.positions - tool.positions[1]) @ rotation
         for a, b in zip(before, after, strict=True):
             assert not any(crosses(plate, a, b) for plate in plates)
 
 
-def pushed_apart(state: State, no_tool: NoTool, site: MakeSite, laws: Laws) -> tuple[float, float]:
+def pushed_apart(state, run):
     """Let parcels in the air part; return their fastest speed against their mean, and the least distance left."""
     fastest = 0.0
     for _ in range(400):
-        run(state, no_tool(1), site(), laws, 1)
+        run(state, 1)
         drift = state.velocities - state.velocities.mean(axis=0)
         fastest = max(fastest, float(np.linalg.norm(drift, axis=1).max()))
     apart = np.linalg.norm(state.positions[:, None] - state.positions[None], axis=2)
@@ -345,38 +257,32 @@ def pushed_apart(state: State, no_tool: NoTool, site: MakeSite, laws: Laws) -> t
 
 
 @pytest.mark.parametrize("distance", [0.01, 0.5, 1.0, 1.8])
-def test_two_parcels_born_into_each_other_part_without_a_bang(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, distance: float
-) -> None:
+def test_two_parcels_born_into_each_other_part_without_a_bang(make_state, run, distance):
     """At the separation speed; only the push of the first sub-step cannot know yet what speed it makes."""
     state = make_state([[0.0, 0.0, 50.0], [distance * RADIUS, 0.0, 50.0]])
     first_push = min(2.0 - distance, LARGEST_OVERLAP) * RADIUS * STIFFNESS * DT / MASS
-    fastest, apart = pushed_apart(state, no_tool, site, laws)
+    fastest, apart = pushed_apart(state, run)
     assert fastest <= max(0.5 * SEPARATION_M_S, first_push) + 1e-9
     assert apart >= 2.0 * RADIUS
 
 
-def test_a_crowd_at_one_place_comes_apart_below_the_speed_limit(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, rng: np.random.Generator
-) -> None:
+def test_a_crowd_at_one_place_comes_apart_below_the_speed_limit(make_state, rng, run):
     """The pushes of all neighbours add up in the first sub-step: 20 parcels come near to the limit."""
     state = make_state(np.array([0.0, 0.0, 50.0]) + rng.uniform(-0.1, 0.1, (20, 3)) * RADIUS)
-    fastest, apart = pushed_apart(state, no_tool, site, laws)
+    fastest, apart = pushed_apart(state, run)
     assert fastest <= LARGEST_SPEED_M_S * 1.1  # against their mean
     assert apart > 1.9 * RADIUS
     assert np.abs(state.velocities[:, :2].mean(axis=0)).max() < 0.2
 
 
 @pytest.mark.parametrize("share", [1.0, 0.3, 0.1, 0.03, 1e-2, 1e-4, 1e-8])
-def test_a_light_remainder_lands_as_softly_as_a_whole_parcel(
-    make_state: MakeState, no_tool: NoTool, site: MakeSite, laws: Laws, share: float
-) -> None:
+def test_a_light_remainder_lands_as_softly_as_a_whole_parcel(make_state, run, share):
     """A stiffness made for whole parcels would shoot it to the sky."""
     radius = RADIUS * share ** (1.0 / 3.0)
     state = make_state([[0.0, 0.0, 0.5]], radii=radius, masses=MASS * share)
     energies = [energy(state)]
     for _ in range(900):
-        run(state, no_tool(1), site(), laws, 1)
+        run(state, 1)
         energies.append(energy(state))
     assert max(energies) == energies[0]
     assert max(energies[400:]) < 0.1 * energies[0]

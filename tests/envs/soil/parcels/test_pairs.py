@@ -1,46 +1,30 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.parcels.dynamics import Laws, press_pairs
-from lerobot_excav.envs.soil.parcels.pairs import (
-    SKIN,
-    Pairs,
-    enlarged,
-    find_pairs,
-    is_outdated,
-    room_for,
-)
+from lerobot_excav.envs.soil.parcels.dynamics import press_pairs
+from lerobot_excav.envs.soil.parcels.pairs import SKIN, enlarged, find_pairs, is_outdated, room_for
 from lerobot_excav.envs.soil.parcels.store import State
-from lerobot_excav.envs.soil.reference import pairs as reference
+from validation.soil.reference import pairs as reference
 
 RADIUS = 0.045
 DT = 0.001
-MakeState = Callable[..., State]
 
 
-def listed(pairs: Pairs, count: int) -> list[tuple[int, int]]:
-    return [
-        (i, int(pairs.partner[k])) for i in range(count) for k in range(pairs.start[i], pairs.start[i + 1])
-    ]
+def listed(pairs, count):
+    return [(i, int(pairs.partner[k])) for i in range(count) for k in range(pairs.start[i], pairs.start[i + 1])]
 
 
-def first_list(state: State, room: Pairs | None = None) -> Pairs:
+def first_list(state, room=None):
     count = len(state.masses)
     none = np.full(count, -1, dtype=np.int64)
-    return find_pairs(
-        state.positions, state.radii, state.asleep, room_for(count), none, room or room_for(count)
-    )
+    return find_pairs(state.positions, state.radii, state.asleep, room_for(count), none, room or room_for(count))
 
 
 @given(seed=st.integers(0, 2**16), count=st.integers(1, 40), size=st.sampled_from([0.1, 0.3, 1.0, 4.0]))
-@settings(max_examples=60, deadline=None)
-def test_all_neighbours_are_listed_once_and_no_others(
-    random_state: MakeState, seed: int, count: int, size: float
-) -> None:
+@settings(max_examples=60)
+def test_all_neighbours_are_listed_once_and_no_others(random_state, seed, count, size):
     rng = np.random.default_rng(seed)
     state = random_state(rng, count, size, centre=rng.uniform(-30.0, 30.0, 3))
     state.asleep[:] = rng.random(count) < 0.4
@@ -49,14 +33,14 @@ def test_all_neighbours_are_listed_once_and_no_others(
     assert set(found) == reference.neighbours(state.positions, state.radii, state.asleep)
 
 
-def test_parcels_whose_cells_have_the_same_number_are_no_neighbours(make_state: MakeState) -> None:
+def test_parcels_whose_cells_have_the_same_number_are_no_neighbours(make_state):
     cell = (2.0 + SKIN) * RADIUS
     far = cell * np.array([[32.0, 0.0, 0.0], [0.0, 32.0, 0.0], [0.0, 0.0, 16.0], [-64.0, 32.0, 16.0]])
     state = make_state(np.concatenate([np.zeros((1, 3)), far]))
     assert listed(first_list(state), 5) == []
 
 
-def test_a_crowd_gets_the_room_that_it_needs(make_state: MakeState) -> None:
+def test_a_crowd_gets_the_room_that_it_needs(make_state):
     """200 parcels at one point are 19,900 pairs, where there is room for 16 per parcel."""
     state = make_state(np.zeros((200, 3)))
     pairs = first_list(state)
@@ -65,10 +49,8 @@ def test_a_crowd_gets_the_room_that_it_needs(make_state: MakeState) -> None:
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=60, deadline=None)
-def test_pair_forces_are_those_of_every_parcel_against_every_other(
-    random_state: MakeState, laws: Laws, seed: int
-) -> None:
+@settings(max_examples=60)
+def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state, laws, seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 12, 0.12)
     state.asleep[:] = rng.random(12) < 0.3
@@ -94,10 +76,8 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=60, deadline=None)
-def test_forces_between_parcels_keep_linear_and_angular_momentum(
-    random_state: MakeState, laws: Laws, seed: int
-) -> None:
+@settings(max_examples=60)
+def test_forces_between_parcels_keep_linear_and_angular_momentum(random_state, laws, seed):
     state = random_state(np.random.default_rng(seed), 12, 0.1)
     press_pairs(state, first_list(state), laws.parcel, DT)
     moments = np.cross(state.positions, state.forces) + state.torques
@@ -106,7 +86,7 @@ def test_forces_between_parcels_keep_linear_and_angular_momentum(
     np.testing.assert_allclose(moments.sum(axis=0), 0.0, atol=1e-9)
 
 
-def remembered(state: State, rng: np.random.Generator) -> tuple[Pairs, dict[tuple[int, int], np.ndarray]]:
+def remembered(state, rng):
     """Return a list whose contacts are all closed, each with a memory of its own, and those memories."""
     pairs = first_list(state)
     names = listed(pairs, len(state.masses))
@@ -116,10 +96,8 @@ def remembered(state: State, rng: np.random.Generator) -> tuple[Pairs, dict[tupl
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=40, deadline=None)
-def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(
-    random_state: MakeState, make_state: MakeState, seed: int
-) -> None:
+@settings(max_examples=40)
+def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(random_state, make_state, seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 20, 0.15)
     pairs, memory = remembered(state, rng)
@@ -140,22 +118,13 @@ def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(
             assert not new.springs[k].any()
 
 
-def test_memory_survives_when_more_parcels_come_than_there_was_room_for(
-    random_state: MakeState, make_state: MakeState, rng: np.random.Generator
-) -> None:
+def test_memory_survives_when_more_parcels_come_than_there_was_room_for(random_state, make_state, rng):
     """Also of the last rows, after earlier ones have left."""
     state = random_state(rng, 30, 0.1)
     pairs, memory = remembered(state, rng)
     stayed = np.arange(10, 30)
     larger = enlarged(pairs, 200)
-    new = find_pairs(
-        state.positions[stayed],
-        state.radii[stayed],
-        state.asleep[stayed],
-        larger,
-        stayed,
-        room_for(200),
-    )
+    new = find_pairs(state.positions[stayed], state.radii[stayed], state.asleep[stayed], larger, stayed, room_for(200))
     names = listed(new, 20)
     assert len(names) > 20
     for k, (i, j) in enumerate(names):
@@ -163,10 +132,8 @@ def test_memory_survives_when_more_parcels_come_than_there_was_room_for(
 
 
 @given(seed=st.integers(0, 2**16), step=st.floats(0.0, 0.5), wind=st.floats(-10.0, 10.0))
-@settings(max_examples=80, deadline=None)
-def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(
-    random_state: MakeState, seed: int, step: float, wind: float
-) -> None:
+@settings(max_examples=80)
+def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(random_state, seed, step, wind):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 25, 0.25)
     pairs = first_list(state)
@@ -179,7 +146,7 @@ def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(
         assert i >= j or (i, j) in known
 
 
-def test_a_list_stays_valid_while_all_parcels_move_together(make_state: MakeState) -> None:
+def test_a_list_stays_valid_while_all_parcels_move_together(make_state):
     state = make_state([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     pairs = first_list(state)
     state.positions[:] += 5.0

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.tasks.scoop.scene import cell_centres_w
-from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets, target_mask_img
+from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets
 
 coordinate = st.floats(-3.0, 3.0)
 
@@ -24,15 +24,12 @@ def test_height_does_not_matter_for_the_patch():
     assert target.contains(np.array([[0.1, 0.1, -2.0], [0.1, 0.1, 5.0]])).all()
 
 
-def test_mask_is_white_where_the_surface_point_is_in_the_patch():
+def test_a_point_that_is_not_known_lies_outside_of_every_patch():
     points_w = np.full((4, 5, 3), np.nan)
     points_w[1, 2] = [0.2, -0.1, 0.6]
     points_w[2, 2] = [1.2, -0.1, 0.6]
-    mask = target_mask_img(Target(center_w=np.zeros(3), yaw_rad=0.0), points_w)
-    assert mask.shape == (4, 5, 3)
-    assert mask.dtype == np.uint8
-    assert np.argwhere(mask[..., 0] == 255).tolist() == [[1, 2]]
-    assert set(np.unique(mask)) == {0, 255}
+    inside = Target(center_w=np.zeros(3), yaw_rad=0.0).contains(points_w)
+    assert np.argwhere(inside).tolist() == [[1, 2]]
 
 
 def test_flat_ground_offers_no_target():

@@ -23,9 +23,7 @@ class WorksiteStandIn:
 
     def __init__(self, edge_pos_w=(0.0, 0.0, 2.0)):
         self.box_mass_kg = 0.0
-        self.machine = type(
-            "Machine", (), {"cutting_edge_pos_w": np.array(edge_pos_w), "box_contact_force_n": 0.0}
-        )()
+        self.machine = type("Machine", (), {"cutting_edge_pos_w": np.array(edge_pos_w), "box_contact_force_n": 0.0})()
         self.soil = type("Soil", (), {"payload_mass_kg": 0.0})()
         self.tool = tool_at(np.array([0.0, 0.0, 3.0]))
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator.cameras import MAIN, CameraPose, axes
+from lerobot_excav.envs.machines.excavator.cameras import MAIN
+from lerobot_excav.envs.machines.pinhole import CameraPose
 from lerobot_excav.envs.tasks.scoop.visibility import hidden_cells, seen_area_px
 
 CELL_M = 0.05
@@ -34,7 +35,7 @@ def hidden_finely(heights_m, eye_w, *, points=4000):
 def test_level_ground_fills_what_its_corners_enclose():
     heights_m = np.full((60, 60), 0.4)
     corners_w = np.array([(x, y, 0.4) for x, y in ((-1.5, -1.5), (1.5, -1.5), (1.5, 1.5), (-1.5, 1.5))])
-    local = (corners_w - MAIN.position) @ axes(MAIN)
+    local = (corners_w - MAIN.position) @ MAIN.axes
     focal_px = 0.5 * PICTURE_PX / np.tan(0.5 * np.radians(MAIN.fovy_deg))
     column, row = (focal_px * local[:, :2] / local[:, 2:]).T
     enclosed_px = 0.5 * abs(np.dot(column, np.roll(row, 1)) - np.dot(row, np.roll(column, 1)))

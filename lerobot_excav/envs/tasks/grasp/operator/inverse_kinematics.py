@@ -32,9 +32,7 @@ class GripperKinematics:
         self._configuration.update(const.HOME_JOINT_POS)
         self._down = self._configuration.get_transform_frame_to_world("grasp", "site").rotation()
         self._start = self._down
-        self._gripper = mink.FrameTask(
-            "grasp", "site", position_cost=_POSITION_COST, orientation_cost=_DIRECTION_COST
-        )
+        self._gripper = mink.FrameTask("grasp", "site", position_cost=_POSITION_COST, orientation_cost=_DIRECTION_COST)
         self._posture = mink.PostureTask(self._configuration.model, cost=_POSTURE_COST)
         self._posture.set_target(const.HOME_JOINT_POS)
         self._limits = [mink.ConfigurationLimit(self._configuration.model)]

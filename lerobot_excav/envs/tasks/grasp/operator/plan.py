@@ -90,9 +90,7 @@ class Plan:
         return Command(self._way_points[-1].pos_w, 1.0, self._way_points[-1].opening)
 
 
-def plan_grasp(
-    start_pos_w: NDArray[np.float64], block_pos_w: NDArray[np.float64], variation: Variation
-) -> Plan:
+def plan_grasp(start_pos_w: NDArray[np.float64], block_pos_w: NDArray[np.float64], variation: Variation) -> Plan:
     """Plan how to fetch a block and put it into the tray.
 
     Args:

@@ -67,9 +67,7 @@ def line(start: BucketPose, end: BucketPose, *, about_pin: bool, samples: int = 
         if about_pin:
             radius = (1 - s) * start.pin_radius_m + s * end.pin_radius_m
             height = (1 - s) * start.pin_height_m + s * end.pin_height_m
-            poses.append(
-                BucketPose.of_pin(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing)
-            )
+            poses.append(BucketPose.of_pin(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
         else:
             radius = (1 - s) * start.radius_m + s * end.radius_m
             height = (1 - s) * start.height_m + s * end.height_m
@@ -130,9 +128,7 @@ class JointMotion:
     def at(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return wanted joint positions [rad] and velocities [rad/s] at a time, each shape (4,)."""
         ahead, behind = self._clock_at(time_s + 0.01), self._clock_at(time_s - 0.01)
-        return self._positions(self._clock_at(time_s)), (
-            self._positions(ahead) - self._positions(behind)
-        ) / 0.02
+        return self._positions(self._clock_at(time_s)), (self._positions(ahead) - self._positions(behind)) / 0.02
 
     @property
     def end(self) -> NDArray[np.float64]:

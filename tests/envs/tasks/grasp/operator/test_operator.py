@@ -22,7 +22,7 @@ def test_operator_works_at_a_lower_frame_rate(play):
 def test_operator_turns_to_a_new_target(play):
     task, _, _ = play(1, 2, frames=450, retarget=(40, 0))
     assert task.is_success
-    assert task.episode_metrics["first_grasped_block"] == 0
+    assert task.metrics()["first_grasped_block"] == 0
 
 
 def test_same_seed_gives_the_same_actions_and_another_seed_others(play):

@@ -3,7 +3,7 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator.constants import JOINT_ACCEL_RAD_S2, JOINT_SPEED_RAD_S
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator import PHASES, ScriptedOperator
+from lerobot_excav.envs.tasks.scoop.operator import PHASES, DigOperator
 from lerobot_excav.envs.tasks.scoop.operator.path import JointMotion
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor
 
@@ -15,7 +15,7 @@ def env():
 
 def drive(env, *, scene_id, target_id, seed):
     env.reset(options={"scene_id": scene_id, "target_id": target_id})
-    operator = ScriptedOperator(rng=np.random.default_rng(seed))
+    operator = DigOperator(rng=np.random.default_rng(seed))
     operator.reset(env)
     actions, phases, over = [], [], False
     while not over:

@@ -1,0 +1,89 @@
+import json
+
+import pytest
+
+from validation.soil import catalogue
+from validation.soil.__main__ import main
+from validation.soil.experiment import SoilExperiment
+from validation.soil.results import Check, Result
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Two quick experiments in place of the real ones; returns the conditions under which they ran."""
+    conditions = []
+
+    def one(code, value, *, is_timed=False):
+        def run(given):
+            conditions.append((code, given))
+            return Result(checks=(Check("mass", value, "kg", high=1.0),))
+
+        return SoilExperiment(code=code, title=code, source="", measures="", gate="", run=run, is_timed=is_timed)
+
+    experiments = (one("T1", 0.5), one("T2", 2.0), one("T3", 2.0, is_timed=True))
+    monkeypatch.setattr(catalogue, "EXPERIMENTS", experiments)
+    return conditions
+
+
+def test_every_value_is_printed_beside_its_gate_and_a_miss_is_exit_code_1(asked, capsys):
+    assert main([]) == 1
+    shown = capsys.readouterr().out
+    assert "0.5 kg" in shown
+    assert "MISSED by 1 kg" in shown
+    assert [code for code, _ in asked] == ["T1", "T2", "T3"]
+
+
+def test_times_decide_no_exit_code(asked):
+    assert main(["--only=T1,T3"]) == 0
+
+
+def test_options_reach_the_experiments(asked):
+    main(["--only=T1", "--soil=gravel", "--fidelity=fast", "--seeds=4,5", "--quick"])
+    _, conditions = asked[0]
+    assert (conditions.preset, conditions.fidelity, conditions.seeds) == ("gravel", "fast", (4, 5))
+    assert conditions.quick
+
+
+def test_values_and_report_are_written(asked, tmp_path, capsys):
+    values, report = tmp_path / "new" / "soil.json", tmp_path / "docs" / "report.md"
+    assert main(["--only=T1", f"--json={values}", "--report", f"--out={report}"]) == 0
+    written = json.loads(values.read_text())
+    assert written["experiments"]["T1"]["checks"][0]["value"] == 0.5
+    assert written["fidelity"] == "standard"
+    assert "## T1" in report.read_text()
+    assert str(report) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--only=T99"], "--only='T99'"),
+        (["--seeds=a"], "--seeds: 'a'"),
+        (["--out=x.md"], "add --report"),
+        (["--report", "--only=T1"], "--only with --report would replace"),
+        (["--report", "--quick"], "--quick with --report would replace"),
+        (["--report", "--soil=gravel"], "--soil with --report would replace"),
+        (["--json=."], "name a file"),
+    ],
+)
+def test_options_that_cannot_be_are_named(asked, options, named, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        main(options)
+    assert named in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_experiments_run(asked, capsys, tmp_path):
+    with pytest.raises(SystemExit, match="2"):
+        main([f"--json={tmp_path}"])
+    assert str(tmp_path) in capsys.readouterr().err
+    assert not asked
+
+
+def test_help_names_every_experiment(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    shown = capsys.readouterr().out
+    for one in catalogue.EXPERIMENTS:
+        assert f" {one.code} " in shown

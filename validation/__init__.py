@@ -1,0 +1,1 @@
+"""Experiments that hold the simulation to published ones; not part of the wheel."""

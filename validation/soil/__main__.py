@@ -1,0 +1,112 @@
+"""Hold the soil to published experiments: columns that collapse, heaps, blades, ledgers.
+
+Prints every measured value beside its gate. With --report it also writes the report with its plots. The exit code
+is 1 if a gate is missed; times, which depend on the machine, do not count for it. Run it from the repository's root.
+
+Examples:
+  python -m validation.soil --quick --only=T3,T12
+      a heap of sand and the mass ledger, in half a minute
+  python -m validation.soil --fidelity=fine --soil=gravel --json=outputs/soil.json
+      everything; experiments made with one kind of sand keep to it
+  python -m validation.soil --report
+      everything, and docs/soil_validation.md with docs/images/soil/*.png
+  python -m validation.soil --quick --only=T1 --report --out=outputs/columns.md
+      the report of a part, with its plots in outputs/images/soil
+
+Experiments:
+  T1  collapse of a column       T11 free fall and dump   T15 stall and energy
+  T3  heap and repose            T12 mass ledger          T16 force against depth
+  T5  force on a blade           T13 determinism
+  T6  factors of earthmoving     T14 speed
+  T8  an operator's cycle
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS
+from lerobot_excav.errors import ConfigurationError, require
+from validation.soil.catalogue import chosen
+from validation.soil.experiment import Conditions
+from validation.soil.report import Outcome, summary_text, write_report
+
+REPORT = Path("docs", "soil_validation.md")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m validation.soil", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", metavar="T1,T3", help="codes of experiments (default: all)")
+    parser.add_argument("--soil", choices=PRESETS, default="sand", help="soil preset (default: sand)")
+    parser.add_argument("--fidelity", choices=FIDELITIES, default="standard", help="default: standard")
+    parser.add_argument("--seeds", type=_seeds, default=(0, 1, 2), help="of random arrangements (default: 0,1,2)")
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, the same gates")
+    parser.add_argument("--report", action="store_true", help="write the report with its plots")
+    parser.add_argument("--out", type=Path, help=f"where to write it (default: {REPORT}, for the whole of it)")
+    parser.add_argument("--json", type=Path, help="also write the values to this file")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    try:
+        _check_files(given)
+        conditions = Conditions(preset=given.soil, fidelity=given.fidelity, seeds=given.seeds, quick=given.quick)
+        experiments = chosen(given.only)
+    except ConfigurationError as error:
+        parser.error(str(error))
+    outcomes: list[Outcome] = []
+    for experiment in experiments:
+        outcomes.append((experiment, experiment.run(conditions)))
+        print(summary_text(outcomes[-1:]), flush=True)
+    if given.json is not None:
+        _write_values(given.json, conditions, outcomes)
+    if given.report:
+        path = given.out or REPORT
+        write_report(outcomes, conditions, path)
+        print(f"written: {path}")
+    return int(any(not result.passed for experiment, result in outcomes if not experiment.is_timed))
+
+
+def _check_files(given: argparse.Namespace) -> None:
+    """Refuse what cannot be written before the experiments run, not after; a part must not replace the report."""
+    require(given.out is None or given.report, "--out names the report; add --report")
+    if given.report and given.out is None:
+        default = _parser().parse_args([])
+        for name in ("only", "soil", "fidelity", "seeds", "quick"):
+            require(
+                getattr(given, name) == getattr(default, name),
+                f"--{name} with --report would replace {REPORT} by another report; add --out=FILE",
+            )
+    for path in (given.json, given.out):
+        if path is not None:
+            require(not path.is_dir(), f"{path} is a folder; name a file in it")
+            path.parent.mkdir(parents=True, exist_ok=True)
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}; give whole numbers, as in --seeds=0,1,2") from None
+
+
+def _write_values(path: Path, conditions: Conditions, outcomes: list[Outcome]) -> None:
+    values = {
+        "soil": conditions.preset,
+        "fidelity": conditions.fidelity,
+        "seeds": conditions.seeds,
+        "quick": conditions.quick,
+        "experiments": {experiment.code: result.as_dict() for experiment, result in outcomes},
+    }
+    path.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""What an experiment is: its source, what it measures, its gate, and how it is run."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+from tqdm import tqdm
+
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS
+from lerobot_excav.errors import require, require_choice
+from validation.soil.results import Check, Result
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Under which conditions the experiments run.
+
+    Attributes:
+        preset: Name of the soil. Experiments that compare soils, or that were made with one sand, say so and do not
+            follow it.
+        fidelity: Numerical effort.
+        seeds: Each repeats the random parts: arrangement of parcels, their jitter.
+        quick: Whether to leave out repetitions and to coarsen series; gates stay as they are.
+    """
+
+    preset: str = "sand"
+    fidelity: str = "standard"
+    seeds: tuple[int, ...] = (0, 1, 2)
+    quick: bool = False
+
+    def __post_init__(self) -> None:
+        require_choice("--soil", self.preset, PRESETS)
+        require_choice("--fidelity", self.fidelity, FIDELITIES)
+        require(len(self.seeds) >= 1, "--seeds is empty; give at least one, as in --seeds=0")
+        require(min(self.seeds) >= 0, f"--seeds={self.seeds}; allowed: 0 and above")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoilExperiment:
+    """One experiment.
+
+    Attributes:
+        code: Short name, as in `--only`.
+        title: What it is.
+        source: Where its numbers come from.
+        measures: What is done and measured.
+        gate: The gate in words.
+        run: Runs it.
+        reasons: Why a check may miss, by the start of its name.
+        is_timed: Whether its values depend on the machine; they then decide nothing but are reported.
+    """
+
+    code: str
+    title: str
+    source: str
+    measures: str
+    gate: str
+    run: Callable[[Conditions], Result]
+    reasons: dict[str, str] = field(default_factory=dict)
+    is_timed: bool = False
+
+    def reason(self, check: Check) -> str:
+        """Return why a check may miss; empty if nobody has found out."""
+        return next((text for start, text in self.reasons.items() if check.name.startswith(start)), "")
+
+
+def track[Item](items: Iterable[Item], label: str) -> Iterator[Item]:
+    """Yield the items of a long series while a bar on a terminal counts them; silent in files and tests."""
+    yield from tqdm(items, desc=label, leave=False, disable=None)
