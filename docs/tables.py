@@ -36,7 +36,7 @@ def with_tables(text: str) -> str:
 
     def written(match: re.Match[str]) -> str:
         begin, cls, without, end = match.groups()
-        return f"{begin}\n{table(resolve_name(cls), without and resolve_name(without))}\n{end}"
+        return f"{begin}\n{table(resolve_name(cls), resolve_name(without) if without else None)}\n{end}"
 
     return TABLE.sub(written, text)
 
@@ -53,4 +53,4 @@ if __name__ == "__main__":
         text = page.read_text()
         if text != (new := with_tables(text)):
             page.write_text(new)
-            print(f"written: {page}")
+            print(f"written: {page}")  # noqa: T201

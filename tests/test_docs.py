@@ -7,15 +7,24 @@ import re
 import shlex
 import textwrap
 from dataclasses import fields
-from itertools import pairwise
 from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
+from lerobot.configs import PreTrainedConfig
+from lerobot.envs.configs import EnvConfig
+from lerobot.robots import RobotConfig
+from lerobot.teleoperators import TeleoperatorConfig
+
+import lerobot_excav.plugin  # noqa: F401
+from lerobot_excav.scripts.arguments import parse_arguments
+from lerobot_excav.scripts.main import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
 TEXTS = {str(page.relative_to(ROOT)): page.read_text() for page in PAGES}
+
+KINDS = {"env": EnvConfig, "robot": RobotConfig, "teleop": TeleoperatorConfig, "policy": PreTrainedConfig}
 
 # What a reader adds by following a page, and what stands for it here. None: left out.
 INVENTED = {
@@ -25,41 +34,29 @@ INVENTED = {
     "--env.mask_source=redness": "--env.mask_source=oracle",
     "--policy.mask_strength=2": None,
 }
-INVENTED_FILES = {"lerobot_env_redness.py"}
+INVENTED_FILES = {"lerobot_env_redness.py", "config_toy_reach_sim.py", "toy_reach_sim.py"}
 
-OLDER_WORDS = (
-    *("--env=", "bench soil", "bench operator", "bench fuzz", "lerobot-excav experiment", "stages.toml"),
-    *("--target-rule", "--keep-failures", "--eval-fraction", "--skip-restarted", "--include-failures"),
-    *("--scene-set", "--first-scene", "version 1", " anew", "it is not so"),
+OLDER_WORDS = re.compile(
+    r"--env=|bench (soil|operator|fuzz)|lerobot-excav experiment|stages\.toml|version 1\b| anew|it is not so"
+    r"|--(target-rule|keep-failures|eval-fraction|skip-restarted|include-failures|scene-set|first-scene)"
 )
 
 
 def blocks(text, language):
-    return [
-        textwrap.dedent(code)
-        for code in re.findall(rf"^ *```{language}\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE)
-    ]
+    found = re.findall(rf"^ *```{language}\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE)
+    return [textwrap.dedent(code) for code in found]
 
 
 def commands(text):
-    """The commands of LeRobot and of this package in a page, as words; those in `$(...)` besides."""
+    """The commands of LeRobot and of this package in a page, as words; those within `$(...)` apart."""
     shown = "\n".join(blocks(text, "bash")).replace("\\\n", " ")
     inside = re.findall(r"\$\((lerobot-[^)]+)\)", shown)
-    inline = re.findall(r"`(lerobot-excav \w+ [^`]*--[^`]+)`", text)
-    lines = [re.sub(r"\$\([^)]*\)", "", shown), *inside, *inline]
-    starts = [match.start() for line in lines[:1] for match in re.finditer(r"^lerobot-", line, flags=re.MULTILINE)]
-    whole = [lines[0][a:b] for a, b in pairwise([*starts, len(lines[0])])]
-    for command in [*(_one(text) for text in whole), *lines[1:]]:
+    inline = re.findall(r"`(lerobot-excav [a-z]+ [^`]*--[^`]+)`", text)
+    # A line, or more where a quotation runs over them.
+    whole = re.findall(r"^lerobot-(?:[^'\n]|'[^']*')*", re.sub(r"\$\([^)]*\)", "", shown), flags=re.MULTILINE)
+    for command in [*whole, *inside, *inline]:
         words = [INVENTED.get(word, word) for word in shlex.split(command, comments=True)]
         yield [word for word in words if word is not None]
-
-
-def _one(text):
-    """Cut what follows a command: it ends with its line, unless a quotation goes on."""
-    for end in [match.start() for match in re.finditer(r"\n|\Z", text)]:
-        if text[:end].count("'") % 2 == 0:
-            return text[:end]
-    return text
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -77,14 +74,13 @@ def test_links_lead_somewhere(name):
 
 @pytest.fixture(scope="module")
 def files():
-    folders = [path for path in ROOT.iterdir() if path.is_dir() and path.name[0] != "."]
-    found = [path for folder in folders if folder.name not in ("outputs", "build", "dist") for path in folder.rglob("*")]
-    return ["/" + str(path.relative_to(ROOT)) for path in [*found, *ROOT.iterdir()]]
+    shown = [path for path in ROOT.iterdir() if path.name[0] != "." and path.name not in ("outputs", "build", "dist")]
+    return ["/" + str(path.relative_to(ROOT)) for top in shown for path in [top, *top.rglob("*")]]
 
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_named_files_and_modules_exist(name, files):
-    for shown in re.findall(r"`([^`\s]+)`", TEXTS[name]):
+    for shown in re.findall(r"[^`\s\"'(),;]+", TEXTS[name]):
         for part in expanded(shown.rstrip("/")):
             is_file = re.fullmatch(r"[\w./-]+\.(py|toml|cff)|(lerobot_excav|tests|examples|workflows)/[\w./]+", part)
             if is_file and Path(part).name not in INVENTED_FILES:
@@ -104,9 +100,6 @@ def expanded(name):
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_commands_can_be_parsed(name):
-    from lerobot_excav.scripts.arguments import parse_arguments
-    from lerobot_excav.scripts.main import COMMANDS
-
     for program, *words in commands(TEXTS[name]):
         if program != "lerobot-excav":
             for word in words:
@@ -120,17 +113,10 @@ def test_commands_can_be_parsed(name):
 
 def assert_is_an_option(word, words):
     """Check an option of LeRobot's that belongs to something of this package."""
-    import lerobot_excav.plugin  # noqa: F401
-    from lerobot.configs import PreTrainedConfig
-    from lerobot.envs.configs import EnvConfig
-    from lerobot.robots import RobotConfig
-    from lerobot.teleoperators import TeleoperatorConfig
-
-    kinds = {"env": EnvConfig, "robot": RobotConfig, "teleop": TeleoperatorConfig, "policy": PreTrainedConfig}
     option = re.match(r"--(\w+)\.(\w+)=", word)
     chosen = option and next((w.split("=")[1] for w in words if w.startswith(f"--{option[1]}.type=")), None)
-    if chosen and option[1] in kinds:
-        known = {field.name for field in fields(kinds[option[1]].get_choice_class(chosen))}
+    if chosen and option[1] in KINDS:
+        known = {field.name for field in fields(KINDS[option[1]].get_choice_class(chosen))}
         assert option[2] in known | {"type"}, word
 
 
@@ -151,8 +137,6 @@ def test_tables_are_those_of_the_code(name, monkeypatch):
 
 
 def test_every_command_has_its_section():
-    from lerobot_excav.scripts.main import COMMANDS
-
     sections = re.findall(r"^## (\S+)$", TEXTS["docs/reference/cli.md"], flags=re.MULTILINE)
     assert set(COMMANDS) <= set(sections)
 
@@ -165,4 +149,4 @@ def test_the_example_has_as_many_files_as_its_page_says():
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_older_words_are_gone(name):
-    assert [word for word in OLDER_WORDS if word in TEXTS[name]] == []
+    assert OLDER_WORDS.search(TEXTS[name]) is None
