@@ -15,7 +15,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-fr5 table-manipulation test fuzz lint type wheel clean
+.PHONY: help setup demo demo-fr5 table-manipulation test fuzz lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -24,7 +24,7 @@ setup: $(READY) ## install everything into .venv
 
 $(READY): pyproject.toml uv.lock
 	@command -v $(PYTHON) >/dev/null 2>&1 && $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] < (3, 12))' || { \
-	  echo "make: '$(PYTHON)' is no Python 3.12 or later."; \
+	  echo "make: '$(PYTHON)' is not Python 3.12 or later."; \
 	  echo "  Debian 13: sudo apt-get install python3 python3-venv"; \
 	  echo "  Ubuntu 24.04: sudo apt-get install python3.12 python3.12-venv"; \
 	  echo "  macOS: brew install python@3.12      anywhere: pyenv install 3.12 or https://www.python.org/downloads/"; \
@@ -32,9 +32,9 @@ $(READY): pyproject.toml uv.lock
 	@test -x $(UV) || $(PYTHON) -m venv $(VENV) || { \
 	  echo "make: '$(PYTHON) -m venv' failed; Debian 13: sudo apt-get install python3-venv,"; \
 	  echo "  Ubuntu 24.04: sudo apt-get install python3.12-venv; then run make again."; exit 1; }
+	@echo "Installing into $(VENV): LeRobot, PyTorch and MuJoCo, several GB the first time. Each package is named as it loads."
 	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
-	@echo "Installing into $(VENV) (LeRobot, PyTorch and MuJoCo: several GB the first time) …"
-	@UV_PROJECT_ENVIRONMENT=$(VENV) UV_COMPILE_BYTECODE=1 $(UV) sync --frozen --quiet --inexact
+	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --inexact
 	@touch $@
 
 demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)
@@ -44,7 +44,6 @@ demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leave
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo_fr5.sh outputs/demo_fr5
 
 table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; JOBS=2; run again to continue)
-	@test -x $(RUN)/snakemake || UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --quiet --inexact --extra workflows
 	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/fr5_grasp/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
@@ -59,8 +58,11 @@ lint: $(READY) ## check style
 type: $(READY) ## check types
 	@$(RUN)/mypy
 
+docs: $(READY) ## build the documentation into site/, every page and link checked
+	@$(RUN)/mkdocs build --strict
+
 wheel: $(READY) ## build the wheel
 	@$(RUN)/python -m build --wheel --no-isolation
 
 clean: ## remove what the targets above made
-	rm -rf $(VENV) outputs build dist
+	rm -rf $(VENV) outputs build dist site

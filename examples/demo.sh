@@ -11,7 +11,8 @@ mkdir -p "$OUT"
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 
 say "1/3  Recording $((SCENES * 4)) paired demonstrations -> $OUT/dataset"
-[ -d "$OUT/dataset" ] || lerobot-excav demos --env=excavator --scenes="$SCENES" --targets=4 --out="$OUT/dataset" --resume
+[ -d "$OUT/dataset" ] || lerobot-excav demos --env.type=excavator --scenes="$SCENES" --targets=4 \
+  --out="$OUT/dataset" --resume=true
 
 say "2/3  Training mask_act for $STEPS steps -> $OUT/train"
 [ -d "$OUT/train/checkpoints/last" ] || {
@@ -28,7 +29,7 @@ lerobot-eval --policy.path="$OUT/train/checkpoints/last/pretrained_model" --poli
   --env.type=excavator --env.scene_set=test --env.metrics_path="$OUT/metrics.jsonl" \
   --eval.n_episodes="$EPISODES" --eval.batch_size=1 --output_dir="$OUT/eval"
 
-[ -f "$OUT/dig.mp4" ] || lerobot-excav bench soil --video="$OUT/dig.mp4"
+[ -f "$OUT/dig.mp4" ] || python -m bench.dig_film "$OUT/dig.mp4"
 
 say "Result"
 lerobot-excav report "$OUT/metrics.jsonl" --out="$OUT/report"

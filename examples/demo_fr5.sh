@@ -25,6 +25,6 @@ done
 
 say "Result"
 lerobot-excav report "$OUT/correct" "$OUT/mismatched"
-lerobot-excav report --rows=examples/demo_fr5_rows.toml --metrics="$OUT" --out="$OUT/report"
+lerobot-excav report --rows=examples/demo_fr5_rows.toml --metrics_folder="$OUT" --out="$OUT/report"
 echo "table:  $OUT/report/report.md"
 echo "video:  $OUT/report/rollouts.mp4  (the mask tinted; above the correct one, below that of another block)"

@@ -11,7 +11,7 @@ os.environ.setdefault("HF_HUB_OFFLINE", "1")
 settings.register_profile("no deadline", deadline=None)
 # `make fuzz`: long and many plays of tests/fuzz.
 settings.register_profile(
-    "fuzz", deadline=None, max_examples=200, stateful_step_count=50, suppress_health_check=list(HealthCheck)
+    "fuzz", deadline=None, max_examples=500, stateful_step_count=50, suppress_health_check=list(HealthCheck)
 )
 settings.load_profile("no deadline")
 

@@ -22,7 +22,7 @@ SMALLER = {
     "--dataset.num_episodes": "1",
     "--dataset.episode_time_s": "2",
 }
-EXTRA = {"lerobot-eval": ["--env.episode_length=5"]}
+EXTRA = {"lerobot-eval --policy": ["--env.episode_length=5"]}
 
 
 def commands():
@@ -52,9 +52,11 @@ def test_make_targets_of_the_readme_exist():
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
 
 
-def test_the_readme_shows_every_part_of_the_soils_test():
-    for command in ("bench soil --quick", "bench fuzz", "bench soil --video"):
-        assert any(f"lerobot-excav {command}" in shown for shown in commands()), command
+def test_the_python_example_runs_as_it_stands():
+    (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    assert len([line for line in example.splitlines() if line.strip()]) <= 10
+    shown = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, check=True).stdout
+    assert shown.startswith("(96, 128, 3) [")
 
 
 def test_readme_has_no_gaps():
@@ -78,7 +80,7 @@ def test_every_command_of_the_readme_runs(tmp_path):
     }
     ran = []
     for command in commands():
-        if command.startswith(("make ", "source ")):
+        if command.startswith(("make ", "source ", "pip ")):
             continue
         words = made_small(command)
         done = subprocess.run(
@@ -88,5 +90,4 @@ def test_every_command_of_the_readme_runs(tmp_path):
         ran.append(words[0])
     assert {"lerobot-excav", "lerobot-train", "lerobot-eval", "lerobot-record", "lerobot-replay"} <= set(ran)
     assert list((tmp_path / "outputs/eval").rglob("*.mp4"))
-    assert (tmp_path / "outputs/dig.mp4").stat().st_size > 0
     assert (tmp_path / "outputs/report/report.md").read_text().count("target") > 0

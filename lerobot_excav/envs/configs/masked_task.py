@@ -47,8 +47,17 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
     render_mode: str | None = setting(
         "rgb_array, from which LeRobot makes videos, or null", default="rgb_array", choices=RENDER_MODES
     )
-    features: dict[str, PolicyFeature] = field(default_factory=dict)
-    features_map: dict[str, str] = field(default_factory=dict)
+    # LeRobot's own fields, explained.
+    features: dict[str, PolicyFeature] = field(
+        default_factory=dict, metadata={"custom_args": {"help": "Derived from the other fields, whatever is given"}}
+    )
+    features_map: dict[str, str] = field(
+        default_factory=dict, metadata={"custom_args": {"help": "Derived from the other fields, whatever is given"}}
+    )
+    max_parallel_tasks: int = setting(
+        "Tasks that LeRobot evaluates at a time; here an evaluation has one", default=1, choices=(1,)
+    )
+    disable_env_checker: bool = setting("Whether to skip Gymnasium's checks of the environment", default=True)
 
     def __post_init__(self) -> None:
         require(

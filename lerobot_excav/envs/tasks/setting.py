@@ -17,6 +17,7 @@ from typing import Any
 from lerobot_excav.errors import ConfigurationError
 
 _METADATA_KEY = "setting"
+_ENDLESS = 2**31 - 1  # limits from here on are there for files and clocks, and need not be told
 _KIND_NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false", Path: "a path"}
 
 
@@ -54,7 +55,8 @@ class Allowed:
         if self.values is not None:
             return "one of " + ", ".join(map(str, self.values))
         if self.low is not None:
-            return f"from {self.low} on" if self.high is None else f"from {self.low} to {self.high}"
+            endless = self.high is None or self.high >= _ENDLESS
+            return f"from {self.low} on" if endless else f"from {self.low} to {self.high}"
         return ""
 
 

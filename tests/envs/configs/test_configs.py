@@ -66,7 +66,7 @@ def test_features_follow_the_image_size_and_can_be_recorded(spec):
         ("mask_noise_px", float("nan"), "0 to 1024"),
         ("target_overlay", "yes", "true or false"),
         ("render_mode", "human", "rgb_array"),
-        ("episode_length", 0, "1 to"),
+        ("episode_length", 0, "from 1 on"),
         ("metrics_episodes", True, "from 1 on"),
         ("metrics_episodes", 5, "--env.metrics_path"),
     ],

@@ -1,0 +1,30 @@
+"""Every option of this package says on the command line what it means and what it may be."""
+
+import dataclasses
+
+import pytest
+from lerobot.envs.configs import EnvConfig
+from lerobot.robots import RobotConfig
+
+import lerobot_excav.plugin  # noqa: F401 - registers every type
+from lerobot_excav.envs.tasks.setting import declared_settings
+
+CONFIGS = {
+    f"--{kind}.type={name}": config
+    for kind, registry in (("env", EnvConfig), ("robot", RobotConfig))
+    for name, config in registry.get_known_choices().items()
+    if config.__module__.startswith("lerobot_excav.")
+}
+LEROBOTS_OWN = {"id", "calibration_dir"}
+
+
+@pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
+def test_every_field_is_explained_with_its_choices(config):
+    allowed = declared_settings(config)
+    for field in dataclasses.fields(config):
+        if field.name in LEROBOTS_OWN:
+            continue
+        text = field.metadata["custom_args"]["help"]
+        assert len(text) > 10, field.name
+        values = allowed[field.name].values if field.name in allowed else None
+        assert all(str(value) in text for value in values or ()), field.name
