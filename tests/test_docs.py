@@ -74,7 +74,9 @@ def test_links_lead_somewhere(name):
 
 @pytest.fixture(scope="module")
 def files():
-    shown = [path for path in ROOT.iterdir() if path.name[0] != "." and path.name not in ("outputs", "build", "dist")]
+    shown = [
+        path for path in ROOT.iterdir() if path.name[0] != "." and path.name not in ("outputs", "build", "dist", "site")
+    ]
     return ["/" + str(path.relative_to(ROOT)) for top in shown for path in [top, *top.rglob("*")]]
 
 
