@@ -17,7 +17,7 @@ so no simulator is loaded here.
 
 from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
-from lerobot_excav.envs.tasks.registry import load_plugins
+from lerobot_excav.envs.plugins import load_plugins
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig

@@ -13,7 +13,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # may use the other row. `plugin`, the list of what is registered with LeRobot, is imported by LeRobot alone.
 LAYERS = [
     [
-        *("envs.constants", "envs.soil", "envs.machines", "envs.masks", "envs.tasks", "envs", "robots"),
+        *("envs.constants", "envs.plugins", "envs.soil", "envs.machines", "envs.masks", "envs.tasks", "envs", "robots"),
         *("teleoperators", "datasets", "evaluation", "scripts"),
     ],
     ["policies"],

@@ -101,7 +101,8 @@ def test_lerobot_eval_plays_it_and_the_report_shows_its_own_columns(run, dataset
     policy = tmp_path / "train" / "checkpoints" / "last" / "pretrained_model"
     metrics = tmp_path / "metrics.jsonl"
     run("-m", "lerobot.scripts.lerobot_eval", f"--policy.path={policy}", *common, "--env.observation_width=48",
-        "--env.episode_length=5", f"--env.metrics_path={metrics}", "--eval.n_episodes=2", "--eval.batch_size=1",
+        "--env.episode_length=5", f"--env.metrics_path={metrics}", "--eval.n_episodes=2", "--eval.batch_size=2",
+        "--eval.use_async_envs=true",
         "--env.mask_source=by_colour", f"--output_dir={tmp_path / 'eval'}")  # fmt: skip
     lines = [json.loads(line) for line in metrics.read_text().splitlines()]
     assert [line["mask_source"] for line in lines] == ["by_colour"] * 2
@@ -117,7 +118,7 @@ def test_the_operator_is_evaluated(run, tmp_path):
 def test_a_source_from_outside_serves_recordings_too(run, tmp_path):
     out = tmp_path / "d"
     run(*excav("demos", "--env.type=toy_reach", "--env.mask_source=by_colour", "--env.observation_height=32",
-               "--env.observation_width=48", "--scenes=1", "--workers=0", f"--out={out}"))  # fmt: skip
+               "--env.observation_width=48", "--scenes=1", "--workers=1", f"--out={out}"))  # fmt: skip
     run(*excav("qc", out, "--replays=1"))
     assert set(pd.read_parquet(out / "meta" / "excav_pairs.parquet")["mask_source"]) == {"by_colour"}
 

@@ -39,7 +39,7 @@ COMMANDS: dict[str, tuple[list[str], str]] = {
 }
 
 # Importing LeRobot takes far longer than parsing a command line, so the commands are forked from one process
-# that has imported LeRobot but not the plugin: each discovers it anew.
+# that has imported LeRobot but not the plugin: each discovers it for itself.
 PROBE = """
 import importlib, json, os, sys, traceback
 commands = json.loads(sys.argv[1])

@@ -53,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     name, *rest = arguments
     # Loaded only now, so that help is instant whatever the other commands need.
-    from lerobot_excav.envs.tasks.registry import load_plugins
+    from lerobot_excav.envs.plugins import load_plugins
     from lerobot_excav.scripts.arguments import parse_arguments
 
     command = importlib.import_module(f"lerobot_excav.scripts.{name}")

@@ -9,7 +9,7 @@ Examples:
   python -m validation.soil --fidelity=fine --soil=gravel --json=outputs/soil.json
       everything; experiments made with one kind of sand keep to it
   python -m validation.soil --report
-      everything, and docs/soil_validation.md with docs/images/soil/*.png
+      everything, and docs/explanation/soil_validation.md with docs/explanation/images/soil/*.png
   python -m validation.soil --quick --only=T1 --report --out=outputs/columns.md
       the report of a part, with its plots in outputs/images/soil
 
@@ -33,7 +33,7 @@ from validation.soil.catalogue import chosen
 from validation.soil.experiment import Conditions
 from validation.soil.report import Outcome, summary_text, write_report
 
-REPORT = Path("docs", "soil_validation.md")
+REPORT = Path("docs", "explanation", "soil_validation.md")
 
 
 def _parser() -> argparse.ArgumentParser:

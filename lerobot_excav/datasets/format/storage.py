@@ -33,5 +33,5 @@ def require_lossless(key: str, info: dict[str, Any]) -> None:
         raise DatasetError(
             f"{key}: dtype='video' with codec={codec!r}, crf={crf} and pix_fmt={pix_fmt!r}, which blurs the mask; "
             f"needed are codec={LOSSLESS_CODEC!r}, crf=0 and pix_fmt one of {', '.join(LOSSLESS_PIX_FMTS)}; record "
-            "with --dataset.video=false, or with the encoder settings of docs/datasets.md"
+            "with --dataset.video=false, or with the encoder settings of docs/reference/schema.md"
         )

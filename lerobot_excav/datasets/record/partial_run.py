@@ -35,7 +35,7 @@ class PartialRun:
         self.episodes.mkdir(parents=True, exist_ok=True)
         self._lock = self._take_lock()
         self._match_settings(settings)
-        # The library's files are complete only once it has closed them, so assembly starts anew; it is the quick part.
+        # The library's files are complete only once it has closed them, so assembly starts again; it is the quick part.
         shutil.rmtree(self.dataset, ignore_errors=True)
 
     @property

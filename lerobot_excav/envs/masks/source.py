@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.plugins import load_plugins
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 Pixels = NDArray[np.bool_]
@@ -93,7 +94,8 @@ def register_mask_source(name: str, make: Callable[[], MaskSource]) -> None:
 
 
 def mask_source_names() -> tuple[str, ...]:
-    """Return the names of all sources."""
+    """Return the names of all sources, those of other packages included."""
+    load_plugins()
     return tuple(_SOURCES)
 
 

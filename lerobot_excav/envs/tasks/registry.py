@@ -3,8 +3,6 @@
 A package of one's own adds a task with `register_task`; environments, recordings, checks and reports then have it.
 """
 
-from importlib.metadata import entry_points
-
 import gymnasium as gym
 
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
@@ -28,12 +26,6 @@ def register_task(spec: TaskSpec) -> None:
     require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
     # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
     gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
-
-
-def load_plugins() -> None:
-    """Import what other packages name as entry points of the group `lerobot_excav.plugins`: they register their tasks."""
-    for entry_point in entry_points(group="lerobot_excav.plugins"):
-        entry_point.load()
 
 
 def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:

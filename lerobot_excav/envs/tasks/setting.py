@@ -26,7 +26,7 @@ class Allowed:
     """Which values a setting may have, beyond those of its type.
 
     Attributes:
-        choices: All of them, or a function that lists them where they can grow; None: any in range.
+        choices: All of them, or a function that lists them where other packages add some; None: any in range.
         low: Least value.
         high: Greatest value.
         also: Another type whose values all do, where Python code and not a command line gives them.
@@ -69,7 +69,9 @@ def setting(meaning: str, *, default: Any, **allowed: Any) -> Any:
         allowed: Fields of `Allowed`.
     """
     limits = Allowed(**allowed)
-    text = ". ".join(part for part in (meaning, limits.words and f"Allowed: {limits.words}") if part)
+    # What other packages add is not known yet.
+    words = "" if callable(limits.choices) else limits.words
+    text = f"{meaning}. Allowed: {words}" if words else meaning
     # argparse formats help texts with the percent operator.
     custom_args: dict[str, Any] = {"help": text.replace("%", "%%")}
     if isinstance(default, bool):

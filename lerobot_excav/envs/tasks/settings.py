@@ -53,7 +53,11 @@ class TaskSettings:
     scene_set: str = setting(
         "Stream of scenes; they share none, and reports are made of test", default="train", choices=SCENE_SETS
     )
-    mask_source: str = setting("What makes the target mask", default="oracle", choices=mask_source_names)
+    mask_source: str = setting(
+        "What makes the target mask: oracle, which knows the scene, or a source of another package",
+        default="oracle",
+        choices=mask_source_names,
+    )
     mask_condition: str = setting("What the target mask shows", default="correct", choices=MASK_CONDITIONS)
     mask_noise: str = setting("Error that is added to the mask", default="none", choices=MASK_NOISES)
     mask_noise_px: int = setting("Size of that error [px]", default=0, low=0, high=_MOST_IMAGE_PX)

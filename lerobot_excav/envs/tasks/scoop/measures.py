@@ -1,4 +1,4 @@
-"""What is measured of Scoop-v0; `docs/datasets.md` defines the measures."""
+"""What is measured of Scoop-v0; `docs/reference/metrics.md` defines the measures."""
 
 from typing import TYPE_CHECKING, Any
 
