@@ -100,9 +100,7 @@ def test_the_page_shows_what_the_stages_make(plan):
 
 
 @pytest.mark.parametrize(
-    "rows",
-    [SNAKEFILE.with_name("rows.toml"), ROOT / "examples" / "demo_fr5_rows.toml"],
-    ids=lambda rows: rows.name,
+    "rows", [SNAKEFILE.with_name("rows.toml"), ROOT / "examples" / "demo_fr5_rows.toml"], ids=lambda rows: rows.name
 )
 def test_the_pages_of_the_repository_can_be_read(rows):
     assert read_contents(rows).rows

@@ -111,11 +111,7 @@ def write_training(tmp_path):
             f"INFO {start} ot_train.py:597 Start offline training on a fixed dataset",
         ]
         data = {"root": f"{tmp_path}/data/pairs", "episodes": list(range(200)), "eval_split": 0.1975}
-        config = {
-            "dataset": {"repo_id": "local/x", **data, **(dataset or {})},
-            "batch_size": 16,
-            "seed": 1000,
-        }
+        config = {"dataset": {"repo_id": "local/x", **data, **(dataset or {})}, "batch_size": 16, "seed": 1000}
         for number, step in enumerate(steps, 1):
             checkpoint = folder / "checkpoints" / f"{step:06d}"
             (checkpoint / "pretrained_model").mkdir(parents=True)

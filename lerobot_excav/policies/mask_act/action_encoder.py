@@ -44,9 +44,7 @@ class ActionEncoder(nn.Module):
         tokens = torch.cat([*head, self.action_proj(actions)], dim=1).transpose(0, 1)  # (sequence, B, D)
         never_pad = action_is_pad.new_zeros(batch_size, len(head))
         out = self.encoder(
-            tokens,
-            pos_embed=self.pos_embed,
-            key_padding_mask=torch.cat([never_pad, action_is_pad], dim=1),
+            tokens, pos_embed=self.pos_embed, key_padding_mask=torch.cat([never_pad, action_is_pad], dim=1)
         )
         mean, log_variance = self.latent_proj(out[0]).split(self.latent_dim, dim=-1)
         return mean, log_variance

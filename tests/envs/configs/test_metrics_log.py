@@ -32,12 +32,7 @@ def test_lines_follow_the_seeds_not_the_finish(log: MetricsLog) -> None:
     log.begin_batch([9, 10])
     log.finish_episode(0, final_info(scene_id=9))
     log.finish_episode(1, final_info(scene_id=10))
-    assert [(line["episode_ix"], line["seed"]) for line in lines_of(log.path)] == [
-        (0, 7),
-        (1, 8),
-        (2, 9),
-        (3, 10),
-    ]
+    assert [(line["episode_ix"], line["seed"]) for line in lines_of(log.path)] == [(0, 7), (1, 8), (2, 9), (3, 10)]
 
 
 def test_a_line_is_place_and_seed_and_what_the_environment_says(log: MetricsLog) -> None:
@@ -74,12 +69,7 @@ def test_surplus_episodes_are_left_out_on_request(tmp_path: Path) -> None:
 
 def test_numpy_values_become_plain_and_missing_numbers_null(log: MetricsLog) -> None:
     log.begin_batch([None, None])
-    values = {
-        "mass_kg": np.float32(0.5),
-        "contacts": np.int64(2),
-        "distance_m": float("nan"),
-        "phase": "dump",
-    }
+    values = {"mass_kg": np.float32(0.5), "contacts": np.int64(2), "distance_m": float("nan"), "phase": "dump"}
     for i in range(2):
         log.finish_episode(i, final_info(**values))
     line = lines_of(log.path)[0]

@@ -156,10 +156,7 @@ def test_a_task_gives_the_same_alone_and_beside_others(tmp_path: Path, task: str
     assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
         (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
     ]
-    expected = {
-        **config.task_spec.make_settings(**own).as_dict(),
-        "simulation_version": spec.simulation_version,
-    }
+    expected = {**config.task_spec.make_settings(**own).as_dict(), "simulation_version": spec.simulation_version}
     assert lines[0].items() >= {k: v for k, v in expected.items() if v is not None}.items()
     assert lines[0].items() >= {"frames": 4, "is_success": False, "commands": [[0, 0]], "shown_target_id": 0}.items()
     # What reports read of the task is there, with the right types.

@@ -27,12 +27,7 @@ def test_rows_know_their_numbers_their_seed_and_where_they_come_from(finished):
     assert paired.seed == 1000
     assert paired.origin.commit.startswith("0123")
     training = paired.origin.training
-    assert (training.name, training.dataset, training.steps, training.minutes) == (
-        "paired",
-        "pairs",
-        2000,
-        20.0,
-    )
+    assert (training.name, training.dataset, training.steps, training.minutes) == ("paired", "pairs", 2000, 20.0)
     assert (training.demonstrations, training.held_out, training.samples) == (200, 40, 32000)
 
 

@@ -79,18 +79,8 @@ def test_the_card_counts_the_held_out_episodes_where_it_can(trained, config, dat
     ("settings", "rows"),
     [
         ({}, ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]),
-        (
-            {},
-            [
-                "four-channel views; trained",
-                "a fourth channel of the main camera. ",
-                "Coordinate channels | no",
-            ],
-        ),
-        (
-            {"target_token": True},
-            ["main camera and a token pooled under the mask. ", "| Target token | yes |"],
-        ),
+        ({}, ["four-channel views; trained", "a fourth channel of the main camera. ", "Coordinate channels | no"]),
+        ({"target_token": True}, ["main camera and a token pooled under the mask. ", "| Target token | yes |"]),
         ({"withhold_mask": True}, ["(`withhold_mask`): the no-condition variant. Weights"]),
         ({"coordinate_channels": True}, ["row and column of every pixel", "| Coordinate channels | yes |"]),
     ],

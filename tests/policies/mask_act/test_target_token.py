@@ -87,8 +87,7 @@ def test_pictures_that_the_cells_do_not_tile_are_encoded_from_edge_to_edge(token
 
 
 @pytest.mark.parametrize(
-    ("box", "shares"),
-    [((16, 0, 16, 16), {(1, 0): 1.0}), ((0, 12, 16, 20), {(0, 0): 0.2, (0, 1): 0.8})],
+    ("box", "shares"), [((16, 0, 16, 16), {(1, 0): 1.0}), ((0, 12, 16, 20), {(0, 0): 0.2, (0, 1): 0.8})]
 )
 def test_the_features_of_cells_weigh_as_much_as_the_mask_covers_them(token, box, shares):
     maps = features()
