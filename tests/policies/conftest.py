@@ -1,7 +1,6 @@
 """A tiny dataset, and the stock `lerobot-train` on it."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,15 +11,8 @@ HEIGHT, WIDTH, FRAMES = 32, 48, 12
 CAMERAS = ("main", "cab", "target_mask")
 
 
-def make_dataset(root: Path, *, seed: int, cameras=CAMERAS, tint: bool = False) -> Path:
-    """Write 3 episodes of random pictures, a still mask and random motion.
-
-    Args:
-        root: Folder to make.
-        seed: Decides pictures and motion.
-        cameras: Names of the pictures.
-        tint: Whether the mask is also drawn into `main`, in red.
-    """
+def make_dataset(root, *, seed, cameras=CAMERAS):
+    """Write 3 episodes of random pictures, a still mask and random motion; returns their folder."""
     image = {"dtype": "image", "shape": (HEIGHT, WIDTH, 3), "names": ["height", "width", "channels"]}
     state_names, action_names = [f"joint_{i}.pos" for i in range(8)], [f"joint_{i}.vel" for i in range(4)]
     features = {
@@ -31,14 +23,12 @@ def make_dataset(root: Path, *, seed: int, cameras=CAMERAS, tint: bool = False) 
     dataset = LeRobotDataset.create("tests/tiny", fps=10, features=features, root=root, use_videos=False)
     rng = np.random.default_rng(seed)
     for episode in range(3):
-        target = np.s_[4 + 5 * episode : 12 + 5 * episode, 8:24]
+        mask = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+        mask[4 + 5 * episode : 12 + 5 * episode, 8:24] = 255
         for _ in range(FRAMES):
-            pictures = {name: rng.integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8) for name in cameras}
+            pictures = {name: rng.integers(0, 255, mask.shape, dtype=np.uint8) for name in cameras}
             if "target_mask" in pictures:
-                pictures["target_mask"][:] = 0
-                pictures["target_mask"][target] = 255
-            if tint:
-                pictures["main"][target] = (255, 0, 0)
+                pictures["target_mask"] = mask
             dataset.add_frame(
                 {
                     **{f"observation.images.{camera}": picture for camera, picture in pictures.items()},
@@ -52,17 +42,8 @@ def make_dataset(root: Path, *, seed: int, cameras=CAMERAS, tint: bool = False) 
     return root
 
 
-def train(dataset: Path | None, run: Path | None, *arguments: str) -> Path:
-    """Run `lerobot-train` as its console script does.
-
-    Args:
-        dataset: Dataset to train on; None: the arguments name it.
-        run: Folder to make; None: the arguments name it.
-        *arguments: Further options.
-
-    Returns:
-        Folder of the last checkpoint.
-    """
+def train(dataset, run, *arguments):
+    """Run `lerobot-train` as its console script does; returns the folder of the last checkpoint."""
     options = ["--policy.device=cpu", "--policy.push_to_hub=false", "--batch_size=4", "--num_workers=0"]
     options += ["--log_freq=1", "--wandb.enable=false", "--dataset.repo_id=tests/tiny"]
     options += [f"--dataset.root={dataset}", f"--output_dir={run}", *arguments]
