@@ -2,7 +2,6 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
 import torch
@@ -20,11 +19,11 @@ pytestmark = pytest.mark.slow
 NEW = ["--policy.type=mask_act", "--policy.preset=fast", "--policy.chunk_size=8", "--policy.dim_model=32"]
 
 
-def settings(checkpoint: Path, file: str = "config.json") -> dict:
+def settings(checkpoint, file="config.json"):
     return json.loads((checkpoint / file).read_text())
 
 
-def check_checkpoint(checkpoint: Path, dataset_root: Path) -> None:
+def check_checkpoint(checkpoint, dataset_root):
     """The mask passes unscaled, the pictures do not, and the plan is finite."""
     policy = MaskACTPolicy.from_pretrained(checkpoint)
     preprocess, postprocess = make_pre_post_processors(policy.config, pretrained_path=str(checkpoint))
@@ -40,12 +39,12 @@ def check_checkpoint(checkpoint: Path, dataset_root: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
+def dataset(tmp_path_factory):
     return make_dataset(tmp_path_factory.mktemp("first") / "data", seed=0)
 
 
 @pytest.fixture(scope="module")
-def checkpoint(dataset) -> Path:
+def checkpoint(dataset):
     """What two steps of training leave."""
     return train(dataset, dataset.parent / "run", *NEW, "--policy.target_token=true", "--steps=2")
 
