@@ -27,15 +27,12 @@ class ActionEncoder(nn.Module):
         self.register_buffer("pos_embed", create_sinusoidal_pos_embedding(token_count, dim).unsqueeze(1))
 
     def forward(self, actions: Tensor, action_is_pad: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
-        """Return mean and log variance of the latent.
+        """Return mean and log variance of the latent, each (B, latent_dim).
 
         Args:
             actions: Normalised demonstrated actions, shape (B, chunk_size, A).
             action_is_pad: True where an action lies beyond its episode, shape (B, chunk_size).
             state: Normalised robot state, shape (B, S), or None for a policy without one.
-
-        Returns:
-            Mean and log variance, each (B, latent_dim).
         """
         batch_size = actions.shape[0]
         head = [self.cls_embed.weight.expand(batch_size, 1, -1)]
