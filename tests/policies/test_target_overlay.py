@@ -4,13 +4,10 @@ import json
 
 import pytest
 import torch
-import toy_reach  # noqa: F401 - registers the task
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.policies.factory import make_pre_post_processors
 
-from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.envs.masks.overlay import OUTLINE_RGB
 
 from .conftest import train
@@ -25,20 +22,11 @@ TINY = ["dim_model=32", "dim_feedforward=32", "n_encoder_layers=1", "n_vae_encod
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory):
-    out = tmp_path_factory.mktemp("tinted") / "data"
-    env = {"target_overlay": True, "observation_height": 32, "observation_width": 48}
-    settings = DemonstrationSettings.of("toy_reach", env, scenes=1)
-    record_demonstrations(settings, out, workers=0, show_progress=False)
-    return out
-
-
-@pytest.fixture(scope="module")
-def checkpoint(dataset):
+def checkpoint(dataset, tmp_path_factory):
     options = ["--policy.type=act", f"--policy.input_features={json.dumps(INPUTS)}"]
     options += ["--policy.pretrained_backbone_weights=null", "--policy.n_action_steps=8"]
     options += [f"--policy.{setting}" for setting in TINY]
-    return train(dataset, dataset.parent / "run", *options, "--batch_size=2", "--steps=2")
+    return train(dataset, tmp_path_factory.mktemp("act") / "run", *options, "--batch_size=2", "--steps=2")
 
 
 @pytest.fixture
