@@ -20,7 +20,6 @@ class Report:
         runs: One row per run, the operator's last.
         differences: By `second - first`, the paired differences to the first run.
         operator: Who played in the operator's run; None without one.
-        bootstrap_seed: Seed of all resampling.
         notes: What a reader has to know about the files.
     """
 
