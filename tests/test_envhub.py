@@ -29,11 +29,7 @@ def hub_cache(tmp_path):
 
 @pytest.mark.parametrize(
     ("cfg", "name", "state_size"),
-    [
-        ("user/digging", "excavator", 8),
-        ({"task": None}, "excavator", 8),
-        ({"task": "FR5Grasp-v0"}, "fr5_grasp", 7),
-    ],
+    [("user/digging", "excavator", 8), ({"task": None}, "excavator", 8), ({"task": "FR5Grasp-v0"}, "fr5_grasp", 7)],
 )
 def test_the_hub_gives_an_environment_that_runs(hub_cache, cfg, name, state_size):
     if isinstance(cfg, dict):

@@ -2,8 +2,8 @@
 
 import re
 import shlex
-import shutil
 import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -21,16 +21,12 @@ SNAKEFILE = ROOT / "workflows" / "fr5_grasp" / "Snakefile"
 EPISODE_FLAGS = "--dataset.episodes=[0,1,2,3] --dataset.eval_split=0.25"
 PROGRAM = re.compile(r"(?:lerobot-excav|lerobot-train|lerobot-eval) .*")
 
-needs_snakemake = pytest.mark.skipif(
-    shutil.which("snakemake") is None, reason="snakemake is not installed; it is in the extra `workflows`"
-)
-
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
     """What a dry run says it would do, in a folder where nothing has been done."""
     folder = tmp_path_factory.mktemp("plan")
-    command = ["snakemake", "-s", str(SNAKEFILE), "--cores", "2", "-n", "-p"]
+    command = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "2", "-n", "-p"]
     options = ["--config", "out=elsewhere", "results=elsewhere/page", "steps=2000"]
     done = subprocess.run([*command, *options], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -38,9 +34,9 @@ def plan(tmp_path_factory):
 
 
 def commands(plan):
-    """Return the planned commands, as words."""
+    """Return the planned commands, as words, without what a log is told of them."""
     found = set()
-    for line in PROGRAM.findall(plan):
+    for line in PROGRAM.findall(re.sub(r"^ *said=.*", "", plan, flags=re.MULTILINE)):
         line = re.sub(r"\)? *>>? .*", "", line).replace("$flags", EPISODE_FLAGS).replace("$config", "c.json")
         found |= set(line.replace(") && ", " && ").split(" && "))
     return [shlex.split(command) for command in sorted(found)]
@@ -53,21 +49,21 @@ def parse(words):
         module = import_module(f"lerobot_excav.scripts.{name}")
         parse_arguments(module.ARGUMENTS, options, command=name, description="")
     elif program == "lerobot-train":
-        draccus.parse(TrainPipelineConfig, args=[o for o in options if not o.startswith("--config_path")])
+        # A training that continues finds its dataset in its file, which is not there yet.
+        options = ["--dataset.repo_id=a/b" if o.startswith("--config_path=") else o for o in options]
+        draccus.parse(TrainPipelineConfig, args=options)
     else:
         # LeRobot itself reads --policy.* from the checkpoint, which is not there yet.
         assert any(option.startswith("--policy.path=") for option in options)
         draccus.parse(EvalPipelineConfig, args=[o for o in options if not o.startswith("--policy.")])
 
 
-@needs_snakemake
 def test_every_stage_is_planned(plan):
     counts = {name: int(number) for name, number in re.findall(r"^(\w+) +(\d+)$", plan, re.MULTILINE)}
     stages = {"data": 3, "train": 5, "val": 4, "test": 22, "checkpoint": 1, "report": 1, "all": 1}
     assert counts == {**stages, "total": sum(stages.values())}
 
 
-@needs_snakemake
 @pytest.mark.slow
 def test_commands_are_accepted_by_their_programs(plan, monkeypatch):
     monkeypatch.setattr("sys.argv", ["test"])  # LeRobot looks there, too
@@ -77,7 +73,6 @@ def test_commands_are_accepted_by_their_programs(plan, monkeypatch):
         parse(words)
 
 
-@needs_snakemake
 def test_test_scenes_are_for_the_table_and_training_scenes_for_training(plan):
     for words in commands(plan):
         sets = [word.partition("=")[2] for word in words if word.startswith("--env.scene_set=")]
@@ -88,7 +83,6 @@ def test_test_scenes_are_for_the_table_and_training_scenes_for_training(plan):
             assert not sets
 
 
-@needs_snakemake
 def test_the_page_shows_what_the_stages_make(plan):
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=Path("elsewhere/test"))
     made = {Path(path).parent for path in re.findall(r"output: (\S+/metrics\.jsonl)", plan)}
@@ -99,13 +93,8 @@ def test_the_page_shows_what_the_stages_make(plan):
     assert {curve.folder for curve in contents.curve} == {str(folder.parent) for folder in curves}
 
 
-@pytest.mark.parametrize(
-    "rows",
-    [SNAKEFILE.with_name("rows.toml"), ROOT / "examples" / "demo_fr5_rows.toml"],
-    ids=lambda rows: rows.name,
-)
-def test_the_pages_of_the_repository_can_be_read(rows):
-    assert read_contents(rows).rows
+def test_the_page_of_the_demo_can_be_read():
+    assert read_contents(ROOT / "examples" / "demo_fr5_rows.toml").rows
 
 
 def test_the_landed_page_is_made_of_what_lies_beside_it():

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.tasks.measures import Column, EpisodeKey, Kind
 from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.statistics import (
-    Interval,
-    mcnemar_exact,
-    newcombe_interval,
-    paired_bootstrap,
-)
+from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, newcombe_interval, paired_bootstrap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +31,7 @@ class Difference:
 
 
 def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Difference]:
-    """Compare two runs.
-
-    Args:
-        first: Reference.
-        second: What is compared with it.
-        rng: Source of the bootstrap.
+    """Compare a second run with a first, its reference.
 
     Raises:
         DatasetError: The runs are of different tasks, show different scenes or targets, or played different worlds.

@@ -40,10 +40,7 @@ class EvaluationOrigin(BaseModel):
 
     @classmethod
     def read(cls, metrics: Path) -> Self:
-        """Read where an evaluation comes from.
-
-        Args:
-            metrics: Its metrics file.
+        """Read where the evaluation of a metrics file comes from.
 
         Raises:
             DatasetError: What lies in the place of the record is not one.

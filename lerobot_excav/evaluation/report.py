@@ -7,14 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from lerobot_excav.evaluation.comparison import (
-    Difference,
-    compare,
-    difference_of_worlds,
-    require_same_task,
-)
+from lerobot_excav.evaluation.comparison import Difference, compare, difference_of_worlds, require_same_task
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.run_summary import RunSummary, summarise
+from lerobot_excav.evaluation.run_summary import RunSummary, measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +20,6 @@ class Report:
         runs: One row per run, the operator's last.
         differences: By `second - first`, the paired differences to the first run.
         operator: Who played in the operator's run; None without one.
-        bootstrap_seed: Seed of all resampling.
         notes: What a reader has to know about the files.
     """
 
@@ -67,11 +61,11 @@ def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) 
         require_same_task(rows[0], run)
     unlike = {run.label: difference_of_worlds(runs[0], run) for run in runs[1:]}
     return Report(
-        runs=[summarise(run, operator, rng) for run in rows],
+        runs=[RunSummary(run=run, values=measured(run, operator, rng)) for run in rows],
         differences={
             f"{run.label} - {runs[0].label}": compare(runs[0], run, rng) for run in runs[1:] if not unlike[run.label]
         },
-        operator=(operator.evaluations[0].operator or "not stated") if operator else None,
+        operator=(operator.first.operator or "not stated") if operator else None,
         bootstrap_seed=seed,
         notes=[
             *(note for run in rows for note in file_notes(run)),
@@ -90,13 +84,7 @@ def file_notes(run: Run) -> list[str]:
 
 
 def write_report(report: Report, markdown: str, folder: Path) -> None:
-    """Write `report.md` and `report.json` into a folder, which is made.
-
-    Args:
-        report: The report.
-        markdown: Its text.
-        folder: Where to.
-    """
+    """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "report.md").write_text(markdown)
     (folder / "report.json").write_text(json.dumps(report.as_dict(), indent=1) + "\n")

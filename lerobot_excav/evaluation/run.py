@@ -25,7 +25,7 @@ class Run:
     evaluations: tuple[Evaluation, ...]
 
     def __post_init__(self) -> None:
-        first = self.evaluations[0]
+        first = self.first
         for evaluation in self.evaluations[1:]:
             require(
                 evaluation.task == first.task and set(evaluation.episodes) == set(first.episodes),
@@ -34,20 +34,22 @@ class Run:
             )
         for name, plural in self.measures.constants.items():
             found = sorted({str(getattr(episode, name)) for episode in self.episodes})
-            require(
-                len(found) == 1,
-                f"{self.label} mixes {plural}: {' and '.join(found)}; give each a file of its own",
-            )
+            require(len(found) == 1, f"{self.label} mixes {plural}: {' and '.join(found)}; give each a file of its own")
+
+    @property
+    def first(self) -> Evaluation:
+        """The first evaluation, or the only one."""
+        return self.evaluations[0]
 
     @property
     def task(self) -> str:
         """Its task."""
-        return self.evaluations[0].task
+        return self.first.task
 
     @property
     def measures(self) -> TaskMeasures:
         """What is measured of the task."""
-        return self.evaluations[0].measures
+        return self.first.measures
 
     @property
     def constants(self) -> dict[str, Any]:
@@ -67,7 +69,7 @@ class Run:
     @property
     def keys(self) -> list[EpisodeKey]:
         """Scenes and targets, sorted."""
-        return sorted(self.evaluations[0].episodes)
+        return sorted(self.first.episodes)
 
     @property
     def episodes(self) -> list[EpisodeRecord]:

@@ -14,11 +14,7 @@ from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootst
 
 @dataclass(frozen=True, kw_only=True)
 class RateOf(Interval):
-    """A rate of some of the episodes.
-
-    Attributes:
-        n: How many episodes it is the rate of.
-    """
+    """A rate of `n` of the episodes."""
 
     n: int
 
@@ -29,12 +25,7 @@ Value = Interval | dict[str, int] | None
 
 @dataclass(frozen=True, kw_only=True)
 class RunSummary:
-    """One row of a report.
-
-    Attributes:
-        run: The run.
-        values: Its measures, by the key of their column.
-    """
+    """One row of a report: a run, and its measures by the key of their column."""
 
     run: Run
     values: dict[str, Value]
@@ -56,8 +47,8 @@ class RunSummary:
         return {**known, **self.counts, **self.run.constants, **values}
 
 
-def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSummary:
-    """Sum up a run.
+def measured(run: Run, operator: Run | None, rng: np.random.Generator) -> dict[str, Value]:
+    """Return the measures of a run by the key of their column.
 
     Args:
         run: The run.
@@ -67,9 +58,7 @@ def summarise(run: Run, operator: Run | None, rng: np.random.Generator) -> RunSu
     Raises:
         DatasetError: The operator's run lacks scenes and targets, or played another world.
     """
-    return RunSummary(
-        run=run, values={column.key: _value(column, run, operator, rng) for column in run.measures.columns}
-    )
+    return {column.key: _value(column, run, operator, rng) for column in run.measures.columns}
 
 
 def _value(column: Column, run: Run, operator: Run | None, rng: np.random.Generator) -> Value:

@@ -17,94 +17,58 @@ RESAMPLES = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """An estimate with its confidence interval.
-
-    Attributes:
-        estimate: Best guess.
-        low: Lower end.
-        high: Upper end.
-    """
+    """An estimate with the ends of its 95 % confidence interval."""
 
     estimate: float
     low: float
     high: float
 
 
-def wilson_interval(successes: int, n: int, *, confidence: float = CONFIDENCE) -> Interval:
+def wilson_interval(successes: int, n: int) -> Interval:
     """Estimate a proportion with Wilson's score interval.
 
     E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212. Unlike the textbook interval it is right for few episodes
     and for rates near 0 and 1.
 
-    Args:
-        successes: Number of successes.
-        n: Number of trials.
-        confidence: Coverage, in (0, 1).
-
     Raises:
-        ConfigurationError: No trials, or successes outside [0, n].
+        ConfigurationError: No trials `n`, or successes outside [0, n].
     """
     require(n >= 1, f"n={n}: a proportion needs at least one episode")
     require(0 <= successes <= n, f"successes={successes} is out of range; allowed: 0 to n={n}")
     p = successes / n
-    ends = stats.binomtest(successes, n).proportion_ci(confidence, method="wilson")
+    ends = stats.binomtest(successes, n).proportion_ci(CONFIDENCE, method="wilson")
     # The ends are exact at p = 0 and p = 1; rounding must not push them past it.
     return Interval(estimate=p, low=min(p, float(ends.low)), high=max(p, float(ends.high)))
 
 
-def bootstrap_mean(values: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE) -> Interval:
-    """Estimate a mean with a percentile bootstrap interval.
-
-    Args:
-        values: Independent values, shape (n,).
-        rng: Source of the resampling.
-        confidence: Coverage, in (0, 1).
+def bootstrap_mean(values: NDArray[Any], rng: np.random.Generator) -> Interval:
+    """Estimate the mean of independent values, shape (n,), with a percentile bootstrap interval.
 
     Raises:
         ConfigurationError: No values.
     """
-    return _bootstrap(np.mean, (values,), rng, confidence)
+    return _bootstrap(np.mean, (values,), rng)
 
 
-def bootstrap_ratio(
-    numerator: NDArray[Any],
-    denominator: NDArray[Any],
-    rng: np.random.Generator,
-    *,
-    confidence: float = CONFIDENCE,
-) -> Interval:
-    """Estimate the ratio of two means of paired values with a percentile bootstrap interval.
-
-    Args:
-        numerator: Values, shape (n,).
-        denominator: Values of the same scenes, shape (n,).
-        rng: Source of the resampling, which draws scenes.
-        confidence: Coverage, in (0, 1).
+def bootstrap_ratio(numerator: NDArray[Any], denominator: NDArray[Any], rng: np.random.Generator) -> Interval:
+    """Estimate the ratio of two means of paired values, each (n,), with a percentile bootstrap interval over scenes.
 
     Raises:
         ConfigurationError: Different lengths, no values, or a denominator without a positive mean.
     """
     _require_pairs(numerator, denominator)
     require(float(np.mean(denominator)) > 0.0, "the operator's mean is zero, so nothing can be related to it")
-    return _bootstrap(_ratio_of_means, (numerator, denominator), rng, confidence)
+    return _bootstrap(_ratio_of_means, (numerator, denominator), rng)
 
 
-def paired_bootstrap(
-    first: NDArray[Any], second: NDArray[Any], rng: np.random.Generator, *, confidence: float = CONFIDENCE
-) -> Interval:
-    """Estimate the mean difference `second - first` of paired values with a percentile bootstrap interval.
-
-    Args:
-        first: Values, shape (n,).
-        second: Values of the same scenes, shape (n,).
-        rng: Source of the resampling, which draws scenes.
-        confidence: Coverage, in (0, 1).
+def paired_bootstrap(first: NDArray[Any], second: NDArray[Any], rng: np.random.Generator) -> Interval:
+    """Estimate the mean of `second - first`, paired values, each (n,), with a percentile bootstrap interval.
 
     Raises:
         ConfigurationError: Different lengths or no values.
     """
     _require_pairs(first, second)
-    return bootstrap_mean(np.asarray(second, float) - np.asarray(first, float), rng, confidence=confidence)
+    return bootstrap_mean(np.asarray(second, float) - np.asarray(first, float), rng)
 
 
 def newcombe_interval(both: int, first_only: int, second_only: int, neither: int) -> Interval:
@@ -113,14 +77,8 @@ def newcombe_interval(both: int, first_only: int, second_only: int, neither: int
     Method 10 of R. G. Newcombe, Stat. Med. 17 (1998) 2635-2650: Wilson's intervals of the two rates, put together with
     regard to their correlation. Unlike a bootstrap it keeps its width where all scenes differ alike, or none does.
 
-    Args:
-        both: Scenes on which both succeed.
-        first_only: Scenes on which only the first succeeds.
-        second_only: Scenes on which only the second succeeds.
-        neither: Scenes on which none succeeds.
-
     Raises:
-        ConfigurationError: No scenes, or a negative number of them.
+        ConfigurationError: No scenes, or a negative number of those on which both, only one, or neither succeeds.
     """
     counts = (both, first_only, second_only, neither)
     require(min(counts) >= 0, f"counts must not be negative: {counts}")
@@ -149,17 +107,10 @@ def _cautious_correlation(both: int, first_only: int, second_only: int, neither:
 
 
 def mcnemar_exact(first_only: int, second_only: int) -> float:
-    """Test whether two success rates on the same scenes are equal.
+    """Return the p-value of equal success rates on the same scenes; 1 if they never differ.
 
     The exact, two-sided form: the scenes on which only one of the two succeeds fall to either side like a fair coin
     (Q. McNemar, Psychometrika 12 (1947) 153-157).
-
-    Args:
-        first_only: Scenes on which only the first succeeds.
-        second_only: Scenes on which only the second succeeds.
-
-    Returns:
-        p-value; 1 if they never differ.
     """
     require(first_only >= 0 and second_only >= 0, f"counts must not be negative: {first_only}, {second_only}")
     n = first_only + second_only
@@ -181,12 +132,7 @@ def _ratio_of_means(numerator: NDArray[Any], denominator: NDArray[Any], axis: in
     return ratios
 
 
-def _bootstrap(
-    statistic: Callable[..., Any],
-    samples: tuple[NDArray[Any], ...],
-    rng: np.random.Generator,
-    confidence: float,
-) -> Interval:
+def _bootstrap(statistic: Callable[..., Any], samples: tuple[NDArray[Any], ...], rng: np.random.Generator) -> Interval:
     """Resample scenes, the same ones in every sample, and take the percentiles of the statistic."""
     samples = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
     require(samples[0].size >= 1, "a mean needs at least one episode")
@@ -199,7 +145,7 @@ def _bootstrap(
         paired=True,
         vectorized=True,
         n_resamples=RESAMPLES,
-        confidence_level=confidence,
+        confidence_level=CONFIDENCE,
         method="percentile",
         rng=rng,
     ).confidence_interval

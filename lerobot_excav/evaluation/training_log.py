@@ -18,13 +18,7 @@ _LINE = re.compile(
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingLog:
-    """Facts of a log; those of a training that was continued are of its first command.
-
-    Attributes:
-        command: Command; None if the log does not say.
-        commit: Commit of the code; None if the log does not say.
-        minutes: Time to every checkpoint, by its step [min].
-    """
+    """Command and commit of a training, those of its first command, or None; minutes to each checkpoint by its step."""
 
     command: str | None = None
     commit: str | None = None
@@ -38,9 +32,7 @@ def read_training_log(log: Path) -> TrainingLog:
     text = log.read_text(errors="replace")
     command, commit = _COMMAND.search(text), _COMMIT.search(text)
     return TrainingLog(
-        command=command[1] if command else None,
-        commit=commit[1] if commit else None,
-        minutes=_minutes(text),
+        command=command[1] if command else None, commit=commit[1] if commit else None, minutes=_minutes(text)
     )
 
 

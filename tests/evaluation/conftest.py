@@ -2,64 +2,38 @@
 
 import json
 from datetime import datetime, timedelta
+from functools import partial
 
 import pytest
 
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.run import Run
 
-
-def _shared(number):
-    return {
-        "episode_ix": number,
-        "seed": number,
-        "scene_set": "test",
-        "scene_id": number,
-        "target_id": number % 4,
-        "commands": [[0, number % 4]],
-        "mask_source": "oracle",
-        "mask_condition": "correct",
-        "mask_noise": "none",
-        "mask_noise_px": 0,
-        "target_overlay": False,
-        "shown_target_id": number % 4,
-        "mask_missing": False,
-        "mask_missing_frames": 0,
-        "frames": 200,
-        "is_success": True,
-    }
+MASK = {"mask_source": "oracle", "mask_condition": "correct", "mask_noise": "none", "mask_noise_px": 0}
+SHARED = {
+    **{"scene_set": "test", **MASK, "target_overlay": False, "mask_missing": False, "mask_missing_frames": 0},
+    **{"frames": 200, "is_success": True},
+}
+SCOOP = {
+    **{"simulation_version": 2, "task": "Scoop-v0", "soil": "sand", "fidelity": "standard", "target_success": True},
+    **{"retained_mass_kg": 300.0, "residual_bucket_mass_kg": 1.5, "hard_target_contacts": 0},
+    **{"spill_before_target_events": 0, "loading_onset_time_s": None},
+}
+GRASP = {
+    **{"simulation_version": 1, "task": "FR5Grasp-v0", "episode_return": 800.0, "target_in_tray": True},
+    **{"blocks_in_tray": 1, "released": True},
+}
 
 
-def scoop(number, **changes):
-    return {
-        **_shared(number),
-        "simulation_version": 2,
-        "task": "Scoop-v0",
-        "soil": "sand",
-        "fidelity": "standard",
-        "target_success": True,
-        "retained_mass_kg": 300.0,
-        "residual_bucket_mass_kg": 1.5,
-        "hard_target_contacts": 0,
-        "spill_before_target_events": 0,
-        "loading_onset_time_s": None,
-        **changes,
-    }
+def line(task, number, /, **changes):
+    """A line of a metrics file; unless changed, a success in the scene and with the seed of its number."""
+    target = number % 4
+    place = {"episode_ix": number, "seed": number, "scene_id": number, "target_id": target, "commands": [[0, target]]}
+    grasped = {"first_grasped_block": target} if task is GRASP else {}
+    return {**place, **SHARED, "shown_target_id": target, **task, **grasped, **changes}
 
 
-def grasp(number, **changes):
-    return {
-        **_shared(number),
-        "simulation_version": 1,
-        "task": "FR5Grasp-v0",
-        "episode_return": 800.0,
-        "first_grasped_block": number % 4,
-        "shown_target_id": number % 4,
-        "target_in_tray": True,
-        "blocks_in_tray": 1,
-        "released": True,
-        **changes,
-    }
+scoop, grasp = partial(line, SCOOP), partial(line, GRASP)
 
 
 @pytest.fixture
@@ -98,10 +72,7 @@ def make_run(metrics_file):
 
 @pytest.fixture
 def write_training(tmp_path):
-    """Leave what lerobot-train and a workflow leave: checkpoints at some steps, one every 10 minutes, and the log.
-
-    Returns the last checkpoint.
-    """
+    """Leave checkpoints at some steps, one every 10 minutes, and the log of a workflow; returns the last checkpoint."""
 
     def write(name, *steps, dataset=None):
         folder, start = tmp_path / "train" / name, datetime(2026, 1, 1, 12, 0, 0)
@@ -111,11 +82,7 @@ def write_training(tmp_path):
             f"INFO {start} ot_train.py:597 Start offline training on a fixed dataset",
         ]
         data = {"root": f"{tmp_path}/data/pairs", "episodes": list(range(200)), "eval_split": 0.1975}
-        config = {
-            "dataset": {"repo_id": "local/x", **data, **(dataset or {})},
-            "batch_size": 16,
-            "seed": 1000,
-        }
+        config = {"dataset": {"repo_id": "local/x", **data, **(dataset or {})}, "batch_size": 16, "seed": 1000}
         for number, step in enumerate(steps, 1):
             checkpoint = folder / "checkpoints" / f"{step:06d}"
             (checkpoint / "pretrained_model").mkdir(parents=True)

@@ -45,9 +45,6 @@ def test_runs_on_other_scenes_are_not_compared(make_run, scoop_line, rng):
 
 def test_the_operator_may_have_played_more_scenes_but_not_fewer(make_run, scoop_line):
     operator = make_run("o", [scoop_line(i, retained_mass_kg=float(i)) for i in range(1, 5)])
-    assert matched(make_run("a", [scoop_line(3), scoop_line(2)]), operator, "retained_mass_kg").tolist() == [
-        2.0,
-        3.0,
-    ]
+    assert matched(make_run("a", [scoop_line(3), scoop_line(2)]), operator, "retained_mass_kg").tolist() == [2.0, 3.0]
     with pytest.raises(DatasetError, match="lacks 1 scenes"):
         matched(make_run("b", [scoop_line(9)]), operator, "retained_mass_kg")

@@ -104,8 +104,3 @@ def test_tasks_are_not_mixed(make_run, grasp_line, scoop_line):
     digging, grasping = make_run("d", [scoop_line(0)]), make_run("g", [grasp_line(0)])
     with pytest.raises(DatasetError, match=r"d is of Scoop-v0 and g of FR5Grasp-v0"):
         make_report([digging, grasping])
-
-
-def test_a_run_can_be_cut_to_some_scenes(make_run, lines):
-    run = make_run("a", lines)
-    assert len(run.only(run.keys[:3]).episodes) == 3

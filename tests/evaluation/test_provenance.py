@@ -46,10 +46,7 @@ def test_without_a_record_nothing_is_known(tmp_path):
         ('{"command": "x"', "not JSON"),
         ('{"x": 1}', "lacks command"),
         ("3", "the whole=3: input should be an object"),
-        (
-            '{"command": "x", "training": {"speed": 3}}',
-            r"training\.speed is not known; allowed: name, dataset",
-        ),
+        ('{"command": "x", "training": {"speed": 3}}', r"training\.speed is not known; allowed: name, dataset"),
         ('{"command": "x", "seconds": "long"}', "seconds='long': input should be a valid number"),
     ],
 )

@@ -1,9 +1,7 @@
-import json
-
 import pytest
 
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.report import make_report, write_report
+from lerobot_excav.evaluation.report import make_report
 from lerobot_excav.evaluation.report_text import report_text
 
 
@@ -55,14 +53,6 @@ def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, scoop_l
     first, second = (make_report([run], seed=seed) for seed in (0, 5))
     assert first.runs[0]["retained_mass_kg"] != second.runs[0]["retained_mass_kg"]
     assert "seed 5" in report_text(second)
-
-
-def test_the_report_is_written_as_markdown_and_json(runs, tmp_path):
-    report = make_report(runs)
-    write_report(report, report_text(report), tmp_path / "new" / "folder")
-    written = json.loads((tmp_path / "new" / "folder" / "report.json").read_text())
-    assert written["runs"][0]["target_success"]["estimate"] == 0.5
-    assert (tmp_path / "new" / "folder" / "report.md").read_text() == report_text(report)
 
 
 @pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])

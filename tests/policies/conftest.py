@@ -1,68 +1,30 @@
-"""A tiny dataset, and the stock `lerobot-train` on it."""
+"""A tiny dataset of the example task, its target tinted into the main picture, and the stock `lerobot-train` on it."""
 
 import sys
-from pathlib import Path
 
-import numpy as np
 import pytest
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
+import toy_reach  # noqa: F401 - registers the task
 from lerobot.scripts import lerobot_train
 
-HEIGHT, WIDTH, FRAMES = 32, 48, 12
-CAMERAS = ("main", "cab", "target_mask")
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 
 
-def make_dataset(root: Path, *, seed: int, cameras=CAMERAS, tint: bool = False) -> Path:
-    """Write 3 episodes of random pictures, a still mask and random motion.
-
-    Args:
-        root: Folder to make.
-        seed: Decides pictures and motion.
-        cameras: Names of the pictures.
-        tint: Whether the mask is also drawn into `main`, in red.
-    """
-    image = {"dtype": "image", "shape": (HEIGHT, WIDTH, 3), "names": ["height", "width", "channels"]}
-    state_names, action_names = [f"joint_{i}.pos" for i in range(8)], [f"joint_{i}.vel" for i in range(4)]
-    features = {
-        **{f"observation.images.{camera}": image for camera in cameras},
-        "observation.state": {"dtype": "float32", "shape": (8,), "names": state_names},
-        "action": {"dtype": "float32", "shape": (4,), "names": action_names},
-    }
-    dataset = LeRobotDataset.create("tests/tiny", fps=10, features=features, root=root, use_videos=False)
-    rng = np.random.default_rng(seed)
-    for episode in range(3):
-        target = np.s_[4 + 5 * episode : 12 + 5 * episode, 8:24]
-        for _ in range(FRAMES):
-            pictures = {name: rng.integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8) for name in cameras}
-            if "target_mask" in pictures:
-                pictures["target_mask"][:] = 0
-                pictures["target_mask"][target] = 255
-            if tint:
-                pictures["main"][target] = (255, 0, 0)
-            dataset.add_frame(
-                {
-                    **{f"observation.images.{camera}": picture for camera, picture in pictures.items()},
-                    "observation.state": rng.normal(5.0, 2.0, 8).astype(np.float32),
-                    "action": rng.uniform(-1, 1, 4).astype(np.float32),
-                    "task": "dig",
-                }
-            )
-        dataset.save_episode()
-    dataset.finalize()
-    return root
+def record(out, **env):
+    """Record 4 episodes; returns their folder."""
+    env = {"target_overlay": True, "observation_height": 32, "observation_width": 48, **env}
+    settings = DemonstrationSettings.of("toy_reach", env, scenes=1)
+    record_demonstrations(settings, out, workers=0, show_progress=False)
+    return out
 
 
-def train(dataset: Path | None, run: Path | None, *arguments: str) -> Path:
-    """Run `lerobot-train` as its console script does.
+@pytest.fixture(scope="session")
+def dataset(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("tiny") / "data")
 
-    Args:
-        dataset: Dataset to train on; None: the arguments name it.
-        run: Folder to make; None: the arguments name it.
-        *arguments: Further options.
 
-    Returns:
-        Folder of the last checkpoint.
-    """
+def train(dataset, run, *arguments):
+    """Run `lerobot-train` as its console script does; returns the folder of the last checkpoint."""
     options = ["--policy.device=cpu", "--policy.push_to_hub=false", "--batch_size=4", "--num_workers=0"]
     options += ["--log_freq=1", "--wandb.enable=false", "--dataset.repo_id=tests/tiny"]
     options += [f"--dataset.root={dataset}", f"--output_dir={run}", *arguments]

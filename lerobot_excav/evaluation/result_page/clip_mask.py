@@ -13,27 +13,16 @@ from lerobot_excav.evaluation.run import Run
 
 @dataclass(frozen=True, kw_only=True)
 class ShownMask:
-    """A mask and the frame from which it was shown.
-
-    Attributes:
-        since: First frame.
-        pixels: Which pixels it marks, bool (H, W).
-    """
+    """A mask, bool (H, W), and the frame from which it was shown."""
 
     since: int
     pixels: NDArray[np.bool_]
 
 
 def shown_masks(run: Run, key: EpisodeKey, *, height: int, width: int) -> list[ShownMask]:
-    """Draw the masks of an episode, in the order in which they were shown.
+    """Draw the masks of an episode for pictures of a size [px], in the order in which they were shown.
 
     After a change of the command the mask is that of the new target as the scene was at the start.
-
-    Args:
-        run: The evaluation.
-        key: The episode.
-        height: Height of the picture [px].
-        width: Width of the picture [px].
 
     Raises:
         RenderingError: Pictures cannot be made on this machine.
@@ -48,7 +37,7 @@ def shown_masks(run: Run, key: EpisodeKey, *, height: int, width: int) -> list[S
     try:
         return [
             ShownMask(since=frame, pixels=_mask(env, key.scene_id, target_id))
-            for frame, target_id in run.evaluations[0].episodes[key].commands
+            for frame, target_id in run.first.episodes[key].commands
         ]
     finally:
         env.close()

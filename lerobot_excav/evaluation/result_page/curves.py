@@ -14,14 +14,7 @@ from lerobot_excav.evaluation.statistics import Interval, wilson_interval
 
 @dataclass(frozen=True, kw_only=True)
 class CurvePoint:
-    """Success of one checkpoint.
-
-    Attributes:
-        step: Its training step.
-        run: The episodes, all in scenes of one set.
-        origin: Where the evaluation comes from.
-        success: Rate with Wilson interval.
-    """
+    """Success of the checkpoint of one training step: its rate in scenes of one set, and where that comes from."""
 
     step: int
     run: Run
@@ -43,11 +36,6 @@ class CurvePoint:
         """Episodes."""
         return len(self.run.episodes)
 
-    @property
-    def metrics(self) -> Path:
-        """The metrics file."""
-        return self.run.evaluations[0].path
-
     def as_dict(self) -> dict[str, Any]:
         """Return the point as plain data."""
         known = {"step": self.step, "minutes": self.minutes, "scene_set": self.scene_set, "n": self.n}
@@ -56,13 +44,7 @@ class CurvePoint:
 
 @dataclass(frozen=True, kw_only=True)
 class SuccessCurve:
-    """Success of the checkpoints of one training, by their step.
-
-    Attributes:
-        label: Name in the plot.
-        name: Name of the training.
-        points: The checkpoints.
-    """
+    """Success of the checkpoints of one training, by their step; `label` names it in the plot."""
 
     label: str
     name: str
@@ -109,6 +91,6 @@ def _require_alike(first: CurvePoint, point: CurvePoint) -> None:
     for name, value in played[0].items():
         if played[1].get(name) != value:
             raise DatasetError(
-                f"{first.metrics} has {name}={value!r} and {point.metrics} {played[1].get(name)!r}; "
+                f"{first.run.first.path} has {name}={value!r} and {point.run.first.path} {played[1].get(name)!r}; "
                 "the points of a curve differ in their training only: put them into folders of their own"
             )

@@ -1,7 +1,6 @@
 """A result page in numbers: rows with where they come from, differences and curves."""
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,60 +14,26 @@ from lerobot_excav.evaluation.report import file_notes
 from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
 from lerobot_excav.evaluation.result_page.curves import SuccessCurve, read_curve
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.run_summary import RunSummary, summarise
+from lerobot_excav.evaluation.run_summary import RunSummary, measured
 from lerobot_excav.evaluation.training import TrainingFacts
 
 
 @dataclass(frozen=True, kw_only=True)
-class PageRow:
-    """A row in numbers.
-
-    Attributes:
-        row: What the page says of it.
-        summary: The episodes and their measures.
-        origin: Command, code and training.
-    """
+class PageRow(RunSummary):
+    """A row: what the contents say of it, its numbers, and its command, code and training."""
 
     row: Row
-    summary: RunSummary
     origin: EvaluationOrigin
-
-    @property
-    def run(self) -> Run:
-        """The episodes."""
-        return self.summary.run
-
-    @property
-    def metrics(self) -> Path:
-        """The metrics file."""
-        return self.run.evaluations[0].path
-
-    @property
-    def seed(self) -> int | None:
-        """Seed of the evaluation."""
-        return self.run.evaluations[0].seed
 
     def as_dict(self) -> dict[str, Any]:
         """Return the row as plain data."""
-        return {
-            **self.summary.as_dict(),
-            "about": self.row.about,
-            "paper": self.row.paper,
-            "seed": self.seed,
-            "origin": self.origin.model_dump(),
-        }
+        known = {"about": self.row.about, "paper": self.row.paper, "seed": self.run.first.seed}
+        return {**super().as_dict(), **known, "origin": self.origin.model_dump()}
 
 
 @dataclass(frozen=True, kw_only=True)
 class PageDifference:
-    """A row compared with a reference on the scenes that both have played.
-
-    Attributes:
-        label: The row.
-        reference: What it is compared with.
-        scenes: How many scenes and targets.
-        differences: Row minus reference, by measure.
-    """
+    """A row minus its reference, by measure, on the scenes that both have played, with their number."""
 
     label: str
     reference: str
@@ -78,14 +43,7 @@ class PageDifference:
 
 @dataclass(frozen=True, kw_only=True)
 class PageSection:
-    """A table in numbers.
-
-    Attributes:
-        section: What the page says of it.
-        rows: The rows that have been run.
-        missing: Labels of those that have not.
-        differences: To the section's reference.
-    """
+    """A table: the rows that have been run, the labels of those that have not, differences to the reference."""
 
     section: Section
     rows: list[PageRow]
@@ -104,14 +62,7 @@ class PageSection:
 
 @dataclass(frozen=True, kw_only=True)
 class ResultPage:
-    """Everything a result page says.
-
-    Attributes:
-        contents: What was asked for.
-        sections: The tables.
-        curves: Success against training.
-        bootstrap_seed: Seed of all resampling.
-    """
+    """Everything that a result page says, and the seed of all resampling."""
 
     contents: Contents
     sections: list[PageSection]
@@ -126,12 +77,8 @@ class ResultPage:
     @property
     def trainings(self) -> list[TrainingFacts]:
         """The checkpoints that were evaluated, each once."""
-        found = {
-            (training.name, training.steps): training
-            for row in self.rows
-            if (training := row.origin.training) is not None
-        }
-        return list(found.values())
+        trainings = [row.origin.training for row in self.rows if row.origin.training is not None]
+        return list({(training.name, training.steps): training for training in trainings}.values())
 
     @property
     def notes(self) -> list[str]:
@@ -164,7 +111,7 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
             so are the points of a curve.
     """
     rng = np.random.default_rng(seed)
-    rows = {row.label: _row(contents, row, rng) for row in contents.rows if _is_run(contents, row)}
+    rows = {row.label: _row(contents, row, rng) for row in contents.rows if contents.metrics_path(row.label).exists()}
     return ResultPage(
         contents=contents,
         sections=[_section(section, rows, rng) for section in contents.section],
@@ -173,14 +120,10 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
     )
 
 
-def _is_run(contents: Contents, row: Row) -> bool:
-    return contents.metrics_path(row.label).exists()
-
-
 def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
     path = contents.metrics_path(row.label)
     run = Run(label=row.label, evaluations=(read_evaluation(path),))
-    return PageRow(row=row, summary=summarise(run, None, rng), origin=EvaluationOrigin.read(path))
+    return PageRow(row=row, run=run, values=measured(run, None, rng), origin=EvaluationOrigin.read(path))
 
 
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
@@ -202,10 +145,8 @@ def _require_known_figures(section: Section, measures: TaskMeasures) -> None:
     """Raise `ConfigurationError` unless every figure of the paper stands beside a column, also in rows not yet run."""
     for row in section.rows:
         for key in row.paper:
-            require(
-                key in measures.compared,
-                f"row {row.label!r}: paper.{key} has no column; allowed: {', '.join(measures.compared)}",
-            )
+            allowed = ", ".join(measures.compared)
+            require(key in measures.compared, f"row {row.label!r}: paper.{key} has no column; allowed: {allowed}")
 
 
 def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDifference:

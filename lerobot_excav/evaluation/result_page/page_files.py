@@ -10,6 +10,7 @@ from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
 from lerobot_excav.evaluation.result_page.video_grid import grid_clips, present_clips, write_grid
+from lerobot_excav.evaluation.run import Run
 
 
 def write_page(page: ResultPage, folder: Path) -> list[Path]:
@@ -42,11 +43,11 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
 
 def _keep_metrics(page: ResultPage, folder: Path) -> None:
     """Copy what the page is made of, and remove what an earlier one was: a page made of the copies must be the same."""
-    copies = [_copy_metrics(row.metrics, folder / f"{row.row.label}.jsonl", row.origin) for row in page.rows]
+    copies = [_copy_metrics(row.run, folder / f"{row.row.label}.jsonl", row.origin) for row in page.rows]
     for curve in page.curves:
         for point in curve.points:
             copy = folder / CURVES / curve.name / f"{point.step:06d}.jsonl"
-            copies.append(_copy_metrics(point.metrics, copy, point.origin))
+            copies.append(_copy_metrics(point.run, copy, point.origin))
     if Path(page.contents.metrics).resolve() == folder.resolve():
         return  # made of the copies themselves
     for kept in [*folder.glob("*.jsonl"), *folder.glob(f"{CURVES}/*/*.jsonl")]:
@@ -56,10 +57,10 @@ def _keep_metrics(page: ResultPage, folder: Path) -> None:
             origin.unlink()
 
 
-def _copy_metrics(metrics: Path, copy: Path, origin: EvaluationOrigin) -> Path:
+def _copy_metrics(run: Run, copy: Path, origin: EvaluationOrigin) -> Path:
     copy.parent.mkdir(parents=True, exist_ok=True)
-    if metrics.resolve() != copy.resolve():
-        shutil.copyfile(metrics, copy)
+    if run.first.path.resolve() != copy.resolve():
+        shutil.copyfile(run.first.path, copy)
     copy.with_suffix(".json").write_text(origin.model_dump_json(indent=1) + "\n")
     return copy
 

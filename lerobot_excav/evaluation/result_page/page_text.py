@@ -3,13 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
-from lerobot_excav.evaluation.markdown import (
-    difference_cells,
-    interval_text,
-    markdown_table,
-    render,
-    value_text,
-)
+from lerobot_excav.evaluation.markdown import difference_cells, interval_text, markdown_table, render, value_text
 from lerobot_excav.evaluation.report_text import simulations
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, PageSection, ResultPage
@@ -82,7 +76,7 @@ def _beside_paper(column: Column, rows: Sequence[PageRow]) -> list[tuple[str, li
 
 
 def _values(column: Column, rows: Sequence[PageRow]) -> list[str]:
-    return [value_text(column, row.summary[column.key]) for row in rows]
+    return [value_text(column, row[column.key]) for row in rows]
 
 
 def _full_header(column: Column) -> str:
@@ -173,10 +167,12 @@ def _commands(page: ResultPage) -> list[tuple[str, str]]:
 def _heading(row: PageRow) -> str:
     changed = " and changes" if row.origin.modified else ""
     commit = f", commit {row.origin.commit[:9]}{changed}" if row.origin.commit else ""
-    return f"{row.row.label}, seed {_number(row.seed)}{commit}"
+    return f"{row.row.label}, seed {_number(row.run.first.seed)}{commit}"
 
 
 def _by_hand(page: ResultPage) -> list[str]:
     """Name what has no known command."""
     trainings = [f"training {training.name}" for training in page.trainings if not training.command]
-    return trainings + [f"{row.row.label} (seed {_number(row.seed)})" for row in page.rows if not row.origin.command]
+    return trainings + [
+        f"{row.row.label} (seed {_number(row.run.first.seed)})" for row in page.rows if not row.origin.command
+    ]

@@ -14,12 +14,7 @@ _DPI = 90
 
 
 def plot_curves(curves: Sequence[SuccessCurve], path: Path) -> None:
-    """Draw success against training steps and, where logs tell, against training minutes.
-
-    Args:
-        curves: One line each, with 95 % intervals.
-        path: PNG file to write; its folder is made.
-    """
+    """Draw success with 95 % intervals against training steps and, where logs tell, minutes, into a PNG file."""
     # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
     from matplotlib.figure import Figure
 

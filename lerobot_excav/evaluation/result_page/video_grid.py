@@ -33,13 +33,7 @@ _QUALITIES = (26, 30, 34, 38, 42)  # constant rate factors of x264, from good to
 
 @dataclass(frozen=True, kw_only=True)
 class Clip:
-    """A tile of the grid.
-
-    Attributes:
-        path: Video of one episode.
-        masks: What the mask marked; drawn into the video.
-        episode: Its record, which colours the border.
-    """
+    """A tile of the grid: the video of an episode, the masks to draw into it, the record that colours its border."""
 
     path: Path
     masks: Sequence[ShownMask]
@@ -71,13 +65,13 @@ def present_clips(page: ResultPage) -> list[Clips]:
 
 def _video(row: PageRow, number: int) -> Path:
     """Return the video of an episode where `lerobot-eval --output_dir=FOLDER` leaves it, beside the metrics."""
-    found = sorted((row.metrics.parent / "videos").glob(f"*/eval_episode_{number}.mp4"))
-    return found[0] if found else row.metrics.parent / "none"
+    folder = row.run.first.path.parent
+    return next(iter(sorted(folder.glob(f"videos/*/eval_episode_{number}.mp4"))), folder / "none")
 
 
 def _clip(row: PageRow, number: int) -> Clip:
     # In the order in which they were played, as the videos are numbered.
-    key, episode = list(row.run.evaluations[0].episodes.items())[number]
+    key, episode = list(row.run.first.episodes.items())[number]
     height, width = next(read_video(_video(row, number))).shape[:2]
     masks = shown_masks(row.run, key, height=height, width=width)
     return Clip(path=_video(row, number), masks=masks, episode=episode)
@@ -91,14 +85,10 @@ def read_video(path: Path) -> Iterator[Image]:
 
 
 def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
-    """Write clips as one video, in real time, as fine as `MAX_BYTES` allows; warn if the coarsest weighs more.
+    """Write rows of clips as one mp4, in real time, as fine as `MAX_BYTES` allows; warn if the coarsest weighs more.
 
     Shorter clips stand still at their end. The border of a tile is green if its episode succeeded, blue if the machine
     did what the shown mask said, which was not the command, and grey otherwise.
-
-    Args:
-        path: File to write (mp4); its folder is made.
-        rows: Clips row by row.
     """
     pictures = _grid_pictures(rows)
     for quality in _QUALITIES:

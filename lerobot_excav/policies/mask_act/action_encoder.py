@@ -27,15 +27,12 @@ class ActionEncoder(nn.Module):
         self.register_buffer("pos_embed", create_sinusoidal_pos_embedding(token_count, dim).unsqueeze(1))
 
     def forward(self, actions: Tensor, action_is_pad: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
-        """Return mean and log variance of the latent.
+        """Return mean and log variance of the latent, each (B, latent_dim).
 
         Args:
             actions: Normalised demonstrated actions, shape (B, chunk_size, A).
             action_is_pad: True where an action lies beyond its episode, shape (B, chunk_size).
             state: Normalised robot state, shape (B, S), or None for a policy without one.
-
-        Returns:
-            Mean and log variance, each (B, latent_dim).
         """
         batch_size = actions.shape[0]
         head = [self.cls_embed.weight.expand(batch_size, 1, -1)]
@@ -44,9 +41,7 @@ class ActionEncoder(nn.Module):
         tokens = torch.cat([*head, self.action_proj(actions)], dim=1).transpose(0, 1)  # (sequence, B, D)
         never_pad = action_is_pad.new_zeros(batch_size, len(head))
         out = self.encoder(
-            tokens,
-            pos_embed=self.pos_embed,
-            key_padding_mask=torch.cat([never_pad, action_is_pad], dim=1),
+            tokens, pos_embed=self.pos_embed, key_padding_mask=torch.cat([never_pad, action_is_pad], dim=1)
         )
         mean, log_variance = self.latent_proj(out[0]).split(self.latent_dim, dim=-1)
         return mean, log_variance

@@ -16,12 +16,7 @@ SMALL_STAGES = ((32, 1), (64, 2), (128, 2))  # width, stride of each residual bl
 
 
 class Backbone(nn.Module):
-    """Map views to feature maps.
-
-    Attributes:
-        stages: The convolutional network without its classifier.
-        feature_count: Channels of the feature map.
-    """
+    """Map views to feature maps of `feature_count` channels, by a convolutional network without its classifier."""
 
     def __init__(self, config: MaskACTConfig) -> None:
         super().__init__()
@@ -45,15 +40,10 @@ class Backbone(nn.Module):
 
 
 def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
-    """Build a narrow residual network of stride 16, for pictures of about 100 pixels and training from scratch.
+    """Build a narrow residual network from (N, 4, H, W) to (N, 128, H / 16, W / 16), to be trained from scratch.
 
-    Its first convolution has stride 4: at stride 2 that layer and its normalisation cost as much as all the rest.
-
-    Args:
-        norm: Normalisation layer.
-
-    Returns:
-        Network from (N, 4, H, W) to (N, 128, H / 16, W / 16).
+    It is meant for pictures of about 100 pixels. Its first convolution has stride 4: at stride 2 that layer and its
+    normalisation cost as much as all the rest.
     """
     stem = nn.Conv2d(3, SMALL_STEM_WIDTH, kernel_size=7, stride=4, padding=3, bias=False)
     nn.init.kaiming_normal_(stem.weight, mode="fan_out", nonlinearity="relu")
@@ -68,15 +58,9 @@ def small_resnet(norm: type[nn.Module]) -> nn.Sequential:
 
 
 def torchvision_resnet(config: MaskACTConfig, norm: type[nn.Module]) -> tuple[nn.Module, int]:
-    """Build a ResNet of torchvision, as ACT does, with a fourth input channel.
+    """Build a ResNet of torchvision up to its last stage, as ACT does, with a fourth input channel; count its features.
 
-    Args:
-        config: Names the network and its weights. Weights are not fetched for a policy that comes from a
-            checkpoint, which brings its own.
-        norm: Normalisation layer.
-
-    Returns:
-        Network up to its last stage, and the number of its feature channels.
+    Weights are not fetched for a policy that comes from a checkpoint, which brings its own.
 
     Raises:
         ConfigurationError: torchvision has no such network.
@@ -101,12 +85,6 @@ def with_mask_channel(stem: nn.Conv2d) -> nn.Conv2d:
 
     A fresh network is therefore blind to the mask, and equals its twin without one, until training finds a use for
     it. Copying the mean of the RGB filters instead would start from a response to the mask as if it were brightness.
-
-    Args:
-        stem: Convolution over RGB, without bias.
-
-    Returns:
-        The same layer, over RGB and mask.
     """
     return widened(stem, torch.zeros_like(stem.weight[:, :1]))
 
@@ -115,42 +93,22 @@ def with_coordinate_channels(stem: nn.Conv2d) -> nn.Conv2d:
     """Widen a first convolution, in place, by two input channels with random weights as large as its RGB filters'.
 
     From zero weights the network found the coordinates too late to profit in a short training.
-
-    Args:
-        stem: Convolution without bias.
-
-    Returns:
-        The same layer, over two more channels.
     """
     return widened(stem, torch.randn_like(stem.weight[:, :2]) * stem.weight[:, :3].std().detach())
 
 
 def widened(stem: nn.Conv2d, weight: Tensor) -> nn.Conv2d:
-    """Append input channels to a convolution, in place.
-
-    Args:
-        stem: The convolution.
-        weight: Weights of the new channels, shape (out, new, k, k).
-
-    Returns:
-        The same layer.
-    """
+    """Append input channels with weights, (out, new, k, k), to a convolution without bias, in place; return it."""
     stem.weight = nn.Parameter(torch.cat([stem.weight.detach(), weight], dim=1))
     stem.in_channels = stem.weight.shape[1]
     return stem
 
 
 def coordinates(views: Tensor) -> Tensor:
-    """Return the row and column of every pixel, each from -1 to 1 (CoordConv, arXiv:1807.03247).
+    """Return row and column of every pixel of views, each from -1 to 1, (1, 2, H, W) (CoordConv, arXiv:1807.03247).
 
     A convolution alone answers alike wherever a pattern lies, and attention adds positions to queries and keys only.
     With these two channels the network can say where it sees the mask.
-
-    Args:
-        views: Pictures, shape (N, C, H, W).
-
-    Returns:
-        Shape (1, 2, H, W).
     """
     height, width = views.shape[-2:]
     rows = torch.linspace(-1, 1, height, device=views.device, dtype=views.dtype)

@@ -5,10 +5,7 @@ from typing import Any
 
 from lerobot.configs import PreTrainedConfig
 from lerobot.optim import AdamWConfig, LRSchedulerConfig
-from lerobot.optim.schedulers import (
-    ConstantWithWarmupSchedulerConfig,
-    CosineAnnealingWithWarmupSchedulerConfig,
-)
+from lerobot.optim.schedulers import ConstantWithWarmupSchedulerConfig, CosineAnnealingWithWarmupSchedulerConfig
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
@@ -118,10 +115,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"{', '.join(str(d) for d in range(1, chunk + 1) if chunk % d == 0)}.",
         )
         steps = resolved(self.n_action_steps)
-        require(
-            1 <= steps <= chunk,
-            f"n_action_steps={steps} must lie between 1 and chunk_size={chunk}, inclusive.",
-        )
+        require(1 <= steps <= chunk, f"n_action_steps={steps} must lie between 1 and chunk_size={chunk}, inclusive.")
         require(
             self.temporal_ensemble_coeff is None or steps == 1,
             f"n_action_steps={steps} must be 1 with temporal_ensemble_coeff={self.temporal_ensemble_coeff}: an "

@@ -57,10 +57,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
 
 def run_time_weights(policy: MaskACTPolicy) -> dict[str, Tensor]:
-    """Return what acting needs: parameters in half precision, statistics as they are.
-
-    Args:
-        policy: A trained policy.
+    """Return what acting needs of a trained policy: parameters in half precision, statistics as they are.
 
     Raises:
         ConfigurationError: A parameter does not fit into half precision (beyond 65504, or not a number).
@@ -85,14 +82,7 @@ def parameter_count(policy: MaskACTPolicy) -> int:
 
 
 def require_checkpoint(checkpoint: Path) -> None:
-    """Raise unless a folder holds a policy of type `mask_act`.
-
-    Args:
-        checkpoint: The folder.
-
-    Raises:
-        ConfigurationError: A file is missing, or the policy is of another type.
-    """
+    """Raise `ConfigurationError` unless a folder holds a policy, and one of type `mask_act`."""
     missing = [name for name in (CONFIG, WEIGHTS) if not (checkpoint / name).is_file()]
     require(
         not missing,

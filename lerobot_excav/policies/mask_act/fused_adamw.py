@@ -19,10 +19,5 @@ class FusedAdamWConfig(AdamWConfig):  # type: ignore[misc]  # LeRobot's classes 
     def build(self, params: OptimizerParams) -> torch.optim.Optimizer:
         """Return the optimizer over parameters or parameter groups, as LeRobot passes them."""
         return torch.optim.AdamW(
-            params,
-            lr=self.lr,
-            betas=self.betas,
-            eps=self.eps,
-            weight_decay=self.weight_decay,
-            fused=True,
+            params, lr=self.lr, betas=self.betas, eps=self.eps, weight_decay=self.weight_decay, fused=True
         )

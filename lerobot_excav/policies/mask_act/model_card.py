@@ -69,11 +69,7 @@ def model_card(checkpoint: Path, config: MaskACTConfig, parameters: int, facts: 
 
 
 def training_facts(checkpoint: Path) -> dict[str, str]:
-    """Return how a checkpoint was trained, as far as the files beside it tell; no local paths.
-
-    Args:
-        checkpoint: A `pretrained_model` folder.
-    """
+    """Return how a `pretrained_model` folder was trained, as far as the files in and beside it tell; no local paths."""
     settings = _read(checkpoint / TRAINING_CONFIG)
     if not settings:
         return {}

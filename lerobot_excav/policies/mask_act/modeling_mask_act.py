@@ -57,13 +57,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     def from_pretrained(
         cls, pretrained_name_or_path: str | Path, *, config: MaskACTConfig | None = None, **kwargs: Any
     ) -> Self:
-        """Load a policy from a checkpoint, without fetching the weights its backbone once started from.
-
-        Args:
-            pretrained_name_or_path: Directory of the checkpoint, or its name on the Hugging Face Hub.
-            config: Settings to use in place of the stored ones.
-            **kwargs: Passed on to LeRobot.
-        """
+        """Load a policy as LeRobot does, without fetching the weights its backbone once started from."""
         if config is None:
             hub = {key: value for key, value in kwargs.items() if key != "strict"}
             config = PreTrainedConfig.from_pretrained(pretrained_name_or_path, **hub)
@@ -95,15 +89,13 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
             ConfigurationError: Unknown reduction, or observations that do not fit the policy.
         """
         require_choice("reduction", reduction, ("mean", "none"))
-        demonstration = Demonstration(actions=batch[ACTION], is_pad=batch["action_is_pad"])
+        demonstration = Demonstration(batch[ACTION], batch["action_is_pad"])
         mask = target_mask(self.config, batch, is_training=True)
         actions, latent = self._run(batch, mask, demonstration if self.training else None)
         error = F.l1_loss(actions, demonstration.actions, reduction="none").mean(dim=-1)  # (B, chunk_size)
         valid = ~demonstration.is_pad
-        if reduction == "mean":
-            loss = (error * valid).sum() / valid.sum().clamp_min(1)
-        else:
-            loss = (error * valid).sum(dim=1) / valid.sum(dim=1).clamp_min(1)
+        over = (0, 1) if reduction == "mean" else 1
+        loss = (error * valid).sum(dim=over) / valid.sum(dim=over).clamp_min(1)
         parts = {"l1_loss": loss.mean().item()}
         if latent is not None:
             divergence = latent.kl_divergence()
@@ -157,17 +149,6 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
 
 def rows(batch: Batch, chosen: Tensor) -> Batch:
-    """Return the observations of some environments.
-
-    Args:
-        batch: Observations of all environments.
-        chosen: Which environments, shape (B,).
-
-    Returns:
-        New batch with the observation tensors of those environments.
-    """
-    return {
-        key: value[chosen]
-        for key, value in batch.items()
-        if key.startswith("observation.") and isinstance(value, Tensor)
-    }
+    """Return a new batch with the observation tensors of the chosen environments, bool (B,)."""
+    tensors = {key: value for key, value in batch.items() if isinstance(value, Tensor)}
+    return {key: value[chosen] for key, value in tensors.items() if key.startswith("observation.")}

@@ -1,7 +1,7 @@
 """The network of `mask_act`."""
 
-from dataclasses import dataclass
 from itertools import chain
+from typing import NamedTuple
 
 import torch
 from lerobot.policies.act.modeling_act import ACTDecoder, ACTEncoder, ACTSinusoidalPositionEmbedding2d
@@ -13,27 +13,15 @@ from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.policies.mask_act.target_token import TargetToken
 
 
-@dataclass(frozen=True, kw_only=True)
-class Demonstration:
-    """Actions that training compares with.
-
-    Attributes:
-        actions: Normalised actions, shape (B, chunk_size, A).
-        is_pad: True where an action lies beyond its episode, shape (B, chunk_size).
-    """
+class Demonstration(NamedTuple):
+    """Normalised actions, (B, chunk_size, A), and where they lie beyond their episode, (B, chunk_size)."""
 
     actions: Tensor
     is_pad: Tensor
 
 
-@dataclass(frozen=True, kw_only=True)
-class Latent:
-    """Gaussian latent of a demonstration.
-
-    Attributes:
-        mean: Shape (B, latent_dim).
-        log_variance: Shape (B, latent_dim).
-    """
+class Latent(NamedTuple):
+    """Gaussian latent of a demonstration: mean and log variance, each (B, latent_dim)."""
 
     mean: Tensor
     log_variance: Tensor
@@ -123,7 +111,9 @@ class MaskACTNetwork(nn.Module):
         Returns:
             Normalised actions, shape (B, chunk_size, A), and the latent of the demonstration, if there is one.
         """
-        latent = self._encode(demonstration, state)
+        latent = None
+        if self.action_encoder is not None and demonstration is not None:
+            latent = Latent(*self.action_encoder(*demonstration, state))
         batch_size = views[0].shape[0]
         z = latent.sample() if latent is not None else views[0].new_zeros(batch_size, self.latent_dim)
         tokens, pos_embed = self._tokens(views, mask, z, state, env_state)
@@ -137,12 +127,6 @@ class MaskACTNetwork(nn.Module):
         )
         actions = self.action_head(decoded.transpose(0, 1))  # (B, queries, actions_per_token * A)
         return actions.reshape(batch_size, *self.action_shape), latent
-
-    def _encode(self, demonstration: Demonstration | None, state: Tensor | None) -> Latent | None:
-        if self.action_encoder is None or demonstration is None:
-            return None
-        mean, log_variance = self.action_encoder(demonstration.actions, demonstration.is_pad, state)
-        return Latent(mean=mean, log_variance=log_variance)
 
     def _tokens(
         self, views: list[Tensor], mask: Tensor, z: Tensor, state: Tensor | None, env_state: Tensor | None

@@ -17,13 +17,7 @@ class TargetWatch:
         self._mask = None
 
     def changed(self, mask: Tensor) -> Tensor:
-        """Return where the mask has changed, and remember it.
-
-        Args:
-            mask: Target masks, 0 or 1, shape (B, 1, H, W).
-
-        Returns:
-            True for each environment whose mask differs from the last one, or that had none before; shape (B,).
+        """Return which masks, (B, 1, H, W), differ from the last ones or had none before, bool (B,), and remember them.
 
         Raises:
             ConfigurationError: The batch has another size than at the last step.
@@ -40,11 +34,7 @@ class TargetWatch:
 
 
 class ActionQueue:
-    """Planned actions of a batch of environments, each at its own place in its plan.
-
-    Args:
-        n_action_steps: Actions executed of each plan.
-    """
+    """Planned actions of a batch of environments, each at its own place in its plan of `n_action_steps`."""
 
     def __init__(self, n_action_steps: int) -> None:
         self._n_action_steps = n_action_steps
@@ -56,23 +46,11 @@ class ActionQueue:
         self._next = torch.empty(0, dtype=torch.long)  # (B,) index of the next action to execute
 
     def stale(self, changed: Tensor) -> Tensor:
-        """Return which environments need a new plan: a new target, or nothing left.
-
-        Args:
-            changed: True where the target is new, shape (B,).
-
-        Returns:
-            True where a plan is needed, shape (B,).
-        """
+        """Return which environments need a new plan, bool (B,): their target has `changed`, or nothing is left."""
         return changed if self._plans is None else changed | (self._next >= self._n_action_steps)
 
     def put(self, stale: Tensor, chunk: Tensor) -> None:
-        """Replace the plans of some environments.
-
-        Args:
-            stale: Which environments, shape (B,).
-            chunk: Their new plans in order, shape (number of stale environments, chunk_size, A).
-        """
+        """Replace the plans of the stale environments, bool (B,), by a chunk, (their number, chunk_size, A)."""
         chunk = chunk[:, : self._n_action_steps]
         start = torch.zeros_like(stale, dtype=torch.long)
         if self._plans is None:
@@ -113,14 +91,9 @@ class TemporalEnsemble:
         self._memory: tuple[Tensor, Tensor] | None = None
 
     def update(self, chunk: Tensor, changed: Tensor) -> Tensor:
-        """Add one plan per environment and return the action of this step.
+        """Add a plan per environment, (B, chunk_size, A), and return the averaged action of this step, (B, A).
 
-        Args:
-            chunk: New plans, shape (B, chunk_size, A).
-            changed: True where the target is new and the past plans are void, shape (B,).
-
-        Returns:
-            Averaged action, shape (B, A).
+        Where the target has `changed`, bool (B,), the past plans are void.
         """
         weights, totals = self._weights.to(chunk), self._totals.to(chunk)
         if self._memory is None:

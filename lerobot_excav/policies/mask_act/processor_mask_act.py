@@ -9,8 +9,7 @@ from lerobot.processor.factory import make_default_policy_processor_steps, make_
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 
 Pipelines = tuple[
-    PolicyProcessorPipeline[dict[str, Any], dict[str, Any]],
-    PolicyProcessorPipeline[PolicyAction, PolicyAction],
+    PolicyProcessorPipeline[dict[str, Any], dict[str, Any]], PolicyProcessorPipeline[PolicyAction, PolicyAction]
 ]
 
 

@@ -67,10 +67,7 @@ def mean_position(mask: Tensor, cells: tuple[int, int], dim: int) -> Tensor:
     Args:
         mask: Target mask, 0 or 1, shape (B, 1, H, W).
         cells: Rows and columns of the feature map.
-        dim: Length of an encoding.
-
-    Returns:
-        Mean encodings, shape (B, dim); zeros for an empty mask.
+        dim: Length of an encoding; the result is (B, dim), zeros for an empty mask.
     """
     pixels = mask[:, 0]
     count = pixels.sum(dim=(1, 2)).clamp_min(1)[:, None]  # (B, 1)
@@ -80,7 +77,7 @@ def mean_position(mask: Tensor, cells: tuple[int, int], dim: int) -> Tensor:
 
 
 def axis_encodings(cell_count: int, pixel_count: int, dim: int) -> Tensor:
-    """Return the sines and cosines of the pixel centres along one axis of a picture.
+    """Return the sines and cosines of the pixel centres along one axis of a picture, shape (pixel_count, dim).
 
     At the centre of a cell this is LeRobot's encoding of that cell (`ACTSinusoidalPositionEmbedding2d`): with cells
     counted from 1, the angles are 2 pi cell / cell_count / TEMPERATURE^(2 i / dim), i = 0, 1, ... for each pair of
@@ -90,9 +87,6 @@ def axis_encodings(cell_count: int, pixel_count: int, dim: int) -> Tensor:
         cell_count: Cells of the feature map along this axis.
         pixel_count: Pixels of the picture along this axis; the cells share them evenly.
         dim: Length of an encoding, even.
-
-    Returns:
-        Encodings, shape (pixel_count, dim).
     """
     cell = (torch.arange(pixel_count) + 0.5) * (cell_count / pixel_count) + 0.5  # pixel centres; first cell at 1
     frequency = TEMPERATURE ** (-2 * torch.arange(dim // 2) / dim)

@@ -6,11 +6,7 @@ import torch
 from torch import Tensor
 
 from lerobot_excav.errors import require
-from lerobot_excav.policies.mask_act.configuration_mask_act import (
-    MISSING_MASK_HINT,
-    MaskACTConfig,
-    require_mask_shape,
-)
+from lerobot_excav.policies.mask_act.configuration_mask_act import MISSING_MASK_HINT, MaskACTConfig, require_mask_shape
 
 Batch = dict[str, Any]
 
@@ -56,17 +52,10 @@ def require_binary(mask_key: str, mask: Tensor) -> None:
 
 
 def masked_views(config: MaskACTConfig, batch: Batch, mask: Tensor) -> list[Tensor]:
-    """Join the mask to the main camera and zeros to every other camera.
-
-    Returns:
-        One (B, 4, H, W) tensor per camera, in the order of `config.camera_keys`.
-    """
-    views = []
-    for key in config.camera_keys:
-        rgb = batch[key]
-        fourth = mask if key == config.main_camera_key else torch.zeros_like(rgb[:, :1])
-        views.append(torch.cat([rgb, fourth], dim=1))
-    return views
+    """Join the mask to the main camera and zeros to every other: (B, 4, H, W) for each of `config.camera_keys`."""
+    nothing = {key: torch.zeros_like(batch[key][:, :1]) for key in config.camera_keys}
+    fourth = nothing | {config.main_camera_key: mask}
+    return [torch.cat([batch[key], fourth[key]], dim=1) for key in config.camera_keys]
 
 
 def require_cameras(config: MaskACTConfig, batch: Batch) -> None:

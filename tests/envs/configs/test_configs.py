@@ -128,11 +128,7 @@ def test_command_line_and_saved_configuration_give_the_same(spec, tmp_path: Path
 @pytest.mark.parametrize(
     ("env_type", "settings", "named"),
     [
-        (
-            "excavator",
-            {"soil": "lava"},
-            "env.soil='lava' is not possible; give one of sand, gravel, dirt, wet_sand",
-        ),
+        ("excavator", {"soil": "lava"}, "env.soil='lava' is not possible; give one of sand, gravel, dirt, wet_sand"),
         ("excavator", {"fidelity": "perfect"}, "one of fast, standard, fine"),
         ("fr5_grasp", {"retarget_frame": 400}, "env.retarget_frame=400 is not possible"),
         ("fr5_grasp", {"retarget_frame": 0}, "env.retarget_frame=0 is not possible"),

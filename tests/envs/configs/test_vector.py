@@ -4,10 +4,7 @@ Most tests use a stand-in environment with episodes of different lengths.
 """
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -29,108 +26,94 @@ EPISODES = 5
 ARM_STATE_SIZE = 7  # its actions are as long as its states
 
 
-def episode_length(seed: int) -> int:
+def episode_length(seed):
     return 3 + seed % 4
 
 
-def countdown_maker() -> Callable[[], gym.Env[Any, Any]]:
+def countdown_maker():
     # Returns a local class, so that worker processes receive the class itself: they cannot import this file.
-    class Countdown(gym.Env[Any, Any]):
+    class Countdown(gym.Env):
         observation_space = gym.spaces.Dict({"agent_pos": gym.spaces.Box(-np.inf, np.inf, (1,), np.float32)})
         action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
         task = task_description = "count down"
         _max_episode_steps = 20
 
-        def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        def reset(self, *, seed=None, options=None):
             super().reset(seed=seed)
             self.seed_given = -1 if seed is None else seed
             self.left = 3 + self.seed_given % 4
             return self.observe(), {"is_success": False}
 
-        def observe(self) -> dict[str, Any]:
+        def observe(self):
             return {"agent_pos": np.array([self.left], np.float32)}
 
-        def step(self, action: Any) -> Any:
+        def step(self, action):
             self.left -= 1
-            done = self.left == 0
-            info: dict[str, Any] = {"is_success": done and self.seed_given % 2 == 1}
+            done, seed = self.left == 0, self.seed_given
+            info = {"is_success": done and seed % 2 == 1}
             if done:
-                info["episode_metrics"] = {
-                    "scene_id": self.seed_given,
-                    "is_success": info["is_success"],
-                    "command": float(action[0]),
-                    "note": f"seed {self.seed_given}",
-                }
+                metrics = {**info, "scene_id": seed, "command": float(action[0]), "note": f"seed {seed}"}
+                info["episode_metrics"] = metrics
             return self.observe(), 1.0 + action[0], done, False, info
 
     return Countdown
 
 
-@PreTrainedConfig.register_subclass("half_for_vector_test")
+@PreTrainedConfig.register_subclass("tenth_for_vector_test")
 @dataclass
-class HalfConfig(PreTrainedConfig):
+class TenthConfig(PreTrainedConfig):
     observation_delta_indices = action_delta_indices = reward_delta_indices = None
 
-    def get_optimizer_preset(self) -> Any: ...
-    def get_scheduler_preset(self) -> Any: ...
-    def validate_features(self) -> None: ...
+    def get_optimizer_preset(self): ...
+    def get_scheduler_preset(self): ...
+    def validate_features(self): ...
 
 
-class HalfPolicy(PreTrainedPolicy):
+class TenthPolicy(PreTrainedPolicy):
     """Answer every observation with a tenth of its state."""
 
-    config_class = HalfConfig
-    name = "half_for_vector_test"
+    config_class = TenthConfig
+    name = "tenth_for_vector_test"
 
-    def get_optim_params(self) -> dict[str, Any]:
-        return {}
+    def get_optim_params(self): ...
+    def reset(self): ...
+    def forward(self, batch): ...
+    def predict_action_chunk(self, batch, **kwargs): ...
 
-    def reset(self) -> None: ...
-    def forward(self, batch: Any) -> Any: ...
-    def predict_action_chunk(self, batch: Any, **kwargs: Any) -> Any: ...
-
-    def select_action(self, batch: Any, **kwargs: Any) -> Any:
+    def select_action(self, batch, **kwargs):
         state = batch["observation.state"]
         return 0.1 * (state if state.shape[1] == ARM_STATE_SIZE else state[:, :4])
 
 
-def evaluate(env: Any, start_seed: int = 100) -> Any:
-    identity = PolicyProcessorPipeline(steps=[])
-    action_identity = PolicyProcessorPipeline(
+def evaluate(env, path, start_seed=100):
+    """Return what LeRobot counts, and the lines of the metrics file."""
+    same = PolicyProcessorPipeline(steps=[])
+    same_action = PolicyProcessorPipeline(
         steps=[], to_transition=lambda action: {"action": action}, to_output=lambda t: t["action"]
     )
+    policy, processors = TenthPolicy(TenthConfig(device="cpu")), (same, same, same, same_action)
     try:
-        return eval_policy(
-            env,
-            HalfPolicy(HalfConfig(device="cpu")),
-            identity,
-            identity,
-            identity,
-            action_identity,
-            n_episodes=EPISODES,
-            start_seed=start_seed,
-        )["per_episode"]
+        counted = eval_policy(env, policy, *processors, n_episodes=EPISODES, start_seed=start_seed)["per_episode"]
     finally:
         env.close()
+    return counted, [json.loads(line) for line in path.read_text().splitlines()]
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Callable[..., Any]:
-    def _run(n_envs: int, *, use_async: bool = False, max_episodes: int | None = EPISODES) -> Any:
-        path = tmp_path / f"{n_envs}{use_async}.jsonl"
-        log = MetricsLog(path, n_envs=n_envs, max_episodes=max_episodes)
+def run(tmp_path):
+    def run(n_envs, *, use_async=False, max_episodes=EPISODES):
+        log = MetricsLog(tmp_path / f"{n_envs}{use_async}.jsonl", n_envs=n_envs, max_episodes=max_episodes)
         env = make_vector_env(countdown_maker(), n_envs, use_async=use_async, metrics_log=log)
-        assert isinstance(env, gym.vector.AsyncVectorEnv) is use_async
-        counted = evaluate(env)
-        return counted, [json.loads(line) for line in path.read_text().splitlines()]
+        # One environment stays in this process.
+        assert isinstance(env, gym.vector.AsyncVectorEnv) == (use_async and n_envs > 1)
+        return evaluate(env, log.path)
 
-    return _run
+    return run
 
 
-def test_one_environment_counts_the_truth(run: Callable[..., Any]) -> None:
-    counted, lines = run(1)
-    for i, (episode, line) in enumerate(zip(counted, lines, strict=True)):
-        seed = 100 + i
+def test_one_environment_counts_the_truth(run):
+    counted, lines = run(1, use_async=True)
+    for seed, episode, line in zip(range(100, 100 + EPISODES), counted, lines, strict=True):
         steps = episode_length(seed)
         assert episode["seed"] == line["seed"] == line["scene_id"] == seed
         assert episode["success"] == line["is_success"] == (seed % 2 == 1)
@@ -138,72 +121,58 @@ def test_one_environment_counts_the_truth(run: Callable[..., Any]) -> None:
         assert line["note"] == f"seed {seed}"
 
 
-def test_several_environments_count_the_same(run: Callable[..., Any]) -> None:
-    assert run(3) == run(1)
+@pytest.mark.parametrize(("n_envs", "use_async"), [(3, False), pytest.param(2, True, marks=pytest.mark.slow)])
+def test_several_environments_count_the_same_also_in_processes_of_their_own(run, n_envs, use_async):
+    assert run(n_envs, use_async=use_async) == run(1)
 
 
 @pytest.mark.parametrize("task", ["Scoop-v0", "FR5Grasp-v0"])
-def test_a_task_gives_the_same_alone_and_beside_others(tmp_path: Path, task: str) -> None:
+def test_a_task_gives_the_same_alone_and_beside_others(tmp_path, task):
     spec, results = TASKS[task], []
     own = {"mask_noise": "shift", "mask_noise_px": 2, "scene_set": "test", "episode_length": 4}
     for n_envs in (1, 3):
         path = tmp_path / f"{n_envs}.jsonl"
         config = EnvConfig.get_choice_class(spec.env_type)(**own, metrics_path=path, metrics_episodes=EPISODES)
-        counted = evaluate(config.create_envs(n_envs)[spec.env_type][0], start_seed=1000)
-        results.append((counted, [json.loads(line) for line in path.read_text().splitlines()]))
+        results.append(evaluate(config.create_envs(n_envs)[spec.env_type][0], path, start_seed=1000))
     assert results[0] == results[1]
     _, lines = results[0]
     assert [(line["seed"], line["scene_id"], line["target_id"]) for line in lines] == [
         (1000 + i, 1000 + i, i % 4) for i in range(EPISODES)
     ]
-    expected = {
-        **config.task_spec.make_settings(**own).as_dict(),
-        "simulation_version": spec.simulation_version,
-    }
+    expected = {**config.task_spec.make_settings(**own).as_dict(), "simulation_version": spec.simulation_version}
     assert lines[0].items() >= {k: v for k, v in expected.items() if v is not None}.items()
     assert lines[0].items() >= {"frames": 4, "is_success": False, "commands": [[0, 0]], "shown_target_id": 0}.items()
     # What reports read of the task is there, with the right types.
     assert spec.measures.record.model_validate_json(path.read_text().splitlines()[0])
 
 
-@pytest.mark.slow
-def test_environments_in_processes_of_their_own_count_the_same(run: Callable[..., Any]) -> None:
-    assert run(2, use_async=True) == run(1)
-
-
 @pytest.mark.parametrize("use_async", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_lerobot_learns_the_length(*, use_async: bool) -> None:
-    config = ExcavatorEnvConfig(episode_length=7)
-    env = config.create_envs(2, use_async_envs=use_async)["excavator"][0]
+def test_lerobot_learns_the_length(use_async):
+    env = ExcavatorEnvConfig(episode_length=7).create_envs(2, use_async_envs=use_async)["excavator"][0]
     assert env.call("_max_episode_steps") == (7, 7)
     env.close()
 
 
-def test_surplus_episodes_are_recognisable(run: Callable[..., Any]) -> None:
+def test_surplus_episodes_are_recognisable(run):
     counted, lines = run(3, max_episodes=None)
     assert [line["episode_ix"] for line in lines] == [0, 1, 2, 3, 4, 5]
     assert len(counted) == EPISODES
 
 
-def test_a_finished_environment_costs_nothing_and_repeats_its_end() -> None:
+def test_a_finished_environment_costs_nothing_and_repeats_its_end():
     env = make_vector_env(countdown_maker(), 2)
     env.reset(seed=[100, 103], options={"lerobot_new_rollout": True})
-    rewards, lefts = [], []
-    for _ in range(6):
-        observation, reward, *_ = env.step(np.zeros((2, 1), np.float32))
-        rewards.append(reward[0])
-        lefts.append(observation["agent_pos"][0, 0])
-    assert rewards == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
-    assert lefts == [2.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    steps = [env.step(np.zeros((2, 1), np.float32)) for _ in range(6)]
     env.close()
+    assert [reward[0] for _, reward, *_ in steps] == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    assert [observation["agent_pos"][0, 0] for observation, *_ in steps] == [2.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
 
-def test_a_plain_reset_begins_a_new_batch(tmp_path: Path) -> None:
+def test_a_plain_reset_begins_a_new_batch(tmp_path):
     path = tmp_path / "metrics.jsonl"
     config = ExcavatorEnvConfig(observation_height=32, observation_width=48, episode_length=2, metrics_path=path)
     env = config.create_envs(1)["excavator"][0]
-    still = np.zeros((1, 4), np.float32)
-    scenes = []
+    still, scenes = np.zeros((1, 4), np.float32), []
     for batch in range(2):
         _, info = env.reset()
         scenes.append(int(info["scene_id"][0]))
@@ -216,20 +185,12 @@ def test_a_plain_reset_begins_a_new_batch(tmp_path: Path) -> None:
     assert [(line["episode_ix"], line["scene_id"]) for line in lines] == list(enumerate(scenes))
 
 
-def test_info_of_env_leaves_out_what_another_environment_said() -> None:
-    infos = {"a": np.array([1, 0]), "_a": np.array([True, False]), "b": {"c": np.array([0, 2])}}
-    infos |= {"_b": np.array([False, True])}
-    infos["b"]["_c"] = np.array([False, True])
-    assert info_of_env(infos, 0) == {"a": 1}
-    assert info_of_env(infos, 1) == {"b": {"c": 2}}
+def test_info_of_env_leaves_out_what_another_environment_said():
+    infos = {"a": np.array([1, 0]), "_a": np.array([True, False]), "_b": np.array([False, True])}
+    infos["b"] = {"c": np.array([0, 2]), "_c": np.array([False, True])}
+    assert [info_of_env(infos, i) for i in range(2)] == [{"a": 1}, {"b": {"c": 2}}]
 
 
-def test_no_environment_at_all_is_refused() -> None:
+def test_no_environment_at_all_is_refused():
     with pytest.raises(ConfigurationError, match="n_envs=0"):
         make_vector_env(countdown_maker(), 0)
-
-
-def test_one_environment_stays_in_this_process() -> None:
-    env = make_vector_env(countdown_maker(), 1, use_async=True)
-    assert isinstance(env, gym.vector.SyncVectorEnv)
-    env.close()

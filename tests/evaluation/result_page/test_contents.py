@@ -4,7 +4,8 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.result_page.contents import read_contents
 
 ROW = '{ label = "a", about = "x" }'
-PAPER = '[[section]]\ntitle = "s"\nrows = [{ label = "a", about = "x", paper = %s }]'
+SECTION = '[[section]]\ntitle = "s"\n'
+PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
 
 
 @pytest.fixture
@@ -21,18 +22,12 @@ def read(tmp_path):
     ("text", "message"),
     [
         ("colour = 1", r"rows\.toml: colour is not known; allowed: .*section"),
-        (
-            '[[section]]\ntitle = "s"\nrows = [{ label = "a" }]',
-            r"rows\.toml: lacks section\[0\]\.rows\[0\]\.about",
-        ),
-        (f'[[section]]\ntitle = "s"\nrows = [{ROW}, {ROW}]', r"\['a'\] stands on the page twice"),
+        (SECTION + 'rows = [{ label = "a" }]', r"rows\.toml: lacks section\[0\]\.rows\[0\]\.about"),
+        (f"{SECTION}rows = [{ROW}, {ROW}]", r"\['a'\] stands on the page twice"),
         (f'[[section]]\ntitle = "s"\nreference = "b"\nrows = [{ROW}]', "'b' is not a row; allowed: a"),
         ('[[clips]]\nlabel = "b"\nepisodes = [1]', "'b' is not a row"),
         ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
-        (
-            '[[clips]]\nlabel = "a"\nepisode = [1]',
-            r"clips\[0\]\.episode is not known; allowed: label, episodes",
-        ),
+        ('[[clips]]\nlabel = "a"\nepisode = [1]', r"clips\[0\]\.episode is not known; allowed: label, episodes"),
         ("[[", "is not TOML"),
         ("text = 3", "text=3: input should be a valid string"),
         ("section = 3", "section=3: input should be a valid array"),
@@ -41,14 +36,8 @@ def read(tmp_path):
         (PAPER % "3", r"rows\[0\]\.paper=3: input should be an object"),
         (PAPER % '{ success = "96" }', r"rows\[0\]\.paper\.success='96': input should be a valid number"),
         (PAPER % "{ success = true }", r"rows\[0\]\.paper\.success=True: input should be a valid number"),
-        (
-            '[[clips]]\nlabel = "a"\nepisodes = "abc"',
-            r"clips\[0\]\.episodes='abc': input should be a valid array",
-        ),
-        (
-            '[[clips]]\nlabel = "a"\nepisodes = [0.5]',
-            r"clips\[0\]\.episodes\[0\]=0.5: input should be a valid integer",
-        ),
+        ('[[clips]]\nlabel = "a"\nepisodes = "abc"', r"clips\[0\]\.episodes='abc': input should be a valid array"),
+        ('[[clips]]\nlabel = "a"\nepisodes = [0.5]', r"clips\[0\]\.episodes\[0\]=0.5: input should be a valid integer"),
     ],
 )
 def test_a_file_that_cannot_be_used_says_why(read, text, message):
@@ -68,7 +57,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_metrics_lie_in_a_folder_or_a_file(tmp_path, read):
-    contents = read(f'[[section]]\ntitle = "s"\nrows = [{ROW}]')
+    contents = read(f"{SECTION}rows = [{ROW}]")
     assert str(contents.metrics_path("a")) == "m/a.jsonl"
 
 

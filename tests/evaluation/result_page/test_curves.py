@@ -35,10 +35,7 @@ def test_files_whose_name_is_no_step_are_no_points(curve):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            {"mask_condition": "mismatched"},
-            r"100.jsonl has mask_condition='correct' and .*200.jsonl 'mismatched'",
-        ),
+        ({"mask_condition": "mismatched"}, r"100.jsonl has mask_condition='correct' and .*200.jsonl 'mismatched'"),
         ({"scene_set": "test"}, r"100.jsonl has scene_set='val' and .*200.jsonl 'test'"),
         ({"simulation_version": 2}, r"simulation_version=1 and .* 2; .* folders of their own"),
         ({"at_1": {"scene_set": "test"}}, r"200.jsonl mixes scenes of test and val"),

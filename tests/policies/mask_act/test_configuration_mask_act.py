@@ -14,14 +14,12 @@ from lerobot_excav.policies.mask_act.presets import PRESETS
 
 from .conftest import CAB, MAIN, MASK, visual
 
+PICTURE, MASKED = visual(3, 32, 48), {"withhold_mask": False, "target_token": False}
+
 
 def test_default_is_the_paper_network_and_needs_no_download():
-    config = MaskACTConfig(device="cpu")
-    assert (config.vision_backbone, config.chunk_size, config.kl_weight) == ("resnet18", 100, 10.0)
-    assert (config.dim_model, config.dim_feedforward) == (512, 3200)
-    assert config.pretrained_backbone_weights is None
-    assert not config.withhold_mask
-    assert not config.target_token
+    expected = {"preset": "paper", "pretrained_backbone_weights": None, "chunk_size": 100, "kl_weight": 10.0, **MASKED}
+    assert {name: getattr(MaskACTConfig(device="cpu"), name) for name in expected} == expected
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -66,11 +64,19 @@ def test_configuration_survives_its_file_and_takes_overrides(tmp_path, config):
         ({"optimizer_lr": 0.0}, r"optimizer_lr=0.0"),
         ({"optimizer_lr_backbone": -1.0}, r"optimizer_lr_backbone=-1.0"),
         ({"dropout": 1.0}, r"dropout=1.0"),
+        ({"input_features": {MASK: PICTURE}}, r"needs a camera.*target_mask"),
+        ({"main_camera": "observation.images.top"}, r"images.top.*images.main"),
+        ({"main_camera": MASK}, r"is the mask itself.*images.main"),
+        ({"input_features": {MAIN: visual(1, 32, 48)}}, r"images.main has 1 channel"),
+        (
+            {"input_features": {MAIN: PICTURE, MASK: visual(3, 16, 48)}},
+            r"target_mask has shape \(3, 16, 48\).*main has shape \(3, 32, 48\)",
+        ),
     ],
 )
-def test_a_bad_setting_is_refused_by_name(config, settings, message):
+def test_a_setting_or_feature_that_does_not_fit_is_refused_by_name(config, settings, message):
     with pytest.raises(ConfigurationError, match=message):
-        config(**settings)
+        config(**settings).validate_features()
 
 
 def test_the_command_line_says_which_setting_is_bad(capsys):
@@ -85,29 +91,10 @@ def test_open_settings_follow_from_others(config):
     assert config(temporal_ensemble_coeff=0.01).n_action_steps == 1
     weights = {"vision_backbone": "resnet18", "pretrained_backbone_weights": "ResNet18_Weights.IMAGENET1K_V1"}
     assert (config().backbone_norm, config(**weights).backbone_norm) == ("batch", "frozen")
-    features = dict.fromkeys((MASK, CAB, MAIN), visual(3, 32, 48))
+    features = dict.fromkeys((MASK, CAB, MAIN), PICTURE)
     assert config(input_features=features).main_camera_key == CAB
     assert config(input_features=features, main_camera=MAIN).main_camera_key == MAIN
     assert config(input_features=features, mask_key=CAB).camera_keys == [MASK, MAIN]
-
-
-@pytest.mark.parametrize(
-    ("features", "settings", "message"),
-    [
-        ({MASK: visual(3, 32, 48)}, {}, r"needs a camera.*target_mask"),
-        ({MAIN: visual(3, 32, 48)}, {"main_camera": "observation.images.top"}, r"images.top.*images.main"),
-        ({MAIN: visual(3, 32, 48)}, {"main_camera": MASK}, r"is the mask itself.*images.main"),
-        ({MAIN: visual(1, 32, 48)}, {}, r"images.main has 1 channel"),
-        (
-            {MAIN: visual(3, 32, 48), MASK: visual(3, 16, 48)},
-            {},
-            r"target_mask has shape \(3, 16, 48\).*main has shape \(3, 32, 48\)",
-        ),
-    ],
-)
-def test_features_that_do_not_fit_are_refused(config, features, settings, message):
-    with pytest.raises(ConfigurationError, match=message):
-        config(input_features=features, **settings).validate_features()
 
 
 @pytest.mark.parametrize(

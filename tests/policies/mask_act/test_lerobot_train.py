@@ -2,10 +2,10 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
 import torch
+from lerobot.datasets.dataset_tools import remove_feature
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.policies.factory import make_pre_post_processors
 from lerobot.scripts import lerobot_train
@@ -13,18 +13,18 @@ from lerobot.scripts import lerobot_train
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
-from ..conftest import make_dataset, train
+from ..conftest import record, train
 
 pytestmark = pytest.mark.slow
 
 NEW = ["--policy.type=mask_act", "--policy.preset=fast", "--policy.chunk_size=8", "--policy.dim_model=32"]
 
 
-def settings(checkpoint: Path, file: str = "config.json") -> dict:
+def settings(checkpoint, file="config.json"):
     return json.loads((checkpoint / file).read_text())
 
 
-def check_checkpoint(checkpoint: Path, dataset_root: Path) -> None:
+def check_checkpoint(checkpoint, dataset_root):
     """The mask passes unscaled, the pictures do not, and the plan is finite."""
     policy = MaskACTPolicy.from_pretrained(checkpoint)
     preprocess, postprocess = make_pre_post_processors(policy.config, pretrained_path=str(checkpoint))
@@ -35,19 +35,14 @@ def check_checkpoint(checkpoint: Path, dataset_root: Path) -> None:
     assert mask.unique().tolist() == [0.0, 1.0]
     assert batch["observation.images.main"].min() < -1
     action = postprocess(policy.select_action(batch))
-    assert action.shape == (1, 4)
+    assert action.shape == (1, 2)
     assert torch.isfinite(action).all()
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
-    return make_dataset(tmp_path_factory.mktemp("first") / "data", seed=0)
-
-
-@pytest.fixture(scope="module")
-def checkpoint(dataset) -> Path:
+def checkpoint(dataset, tmp_path_factory):
     """What two steps of training leave."""
-    return train(dataset, dataset.parent / "run", *NEW, "--policy.target_token=true", "--steps=2")
+    return train(dataset, tmp_path_factory.mktemp("mask_act") / "run", *NEW, "--policy.target_token=true", "--steps=2")
 
 
 def test_a_trained_checkpoint_loads_and_the_preset_gave_way_to_flags(dataset, checkpoint):
@@ -71,15 +66,16 @@ def test_training_resumes_where_it_stopped(dataset, checkpoint, monkeypatch):
 
 
 def test_fine_tuning_on_another_dataset_keeps_the_mask_unscaled(checkpoint, tmp_path):
-    other = make_dataset(tmp_path / "data", seed=1)
+    other = record(tmp_path / "data", table="ice")
     options = [f"--policy.path={checkpoint}", "--policy.optimizer_lr=1e-4", "--steps=2"]
     tuned = train(other, tmp_path / "run", *options)
     check_checkpoint(tuned, other)
     assert {"optimizer_lr": 1e-4, "dim_model": 32}.items() <= settings(tuned).items()
 
 
-def test_a_dataset_without_masks_trains_the_no_condition_variant_only(checkpoint, tmp_path):
-    unmasked = make_dataset(tmp_path / "data", seed=2, cameras=("main", "cab"))
+def test_a_dataset_without_masks_trains_the_no_condition_variant_only(dataset, checkpoint, tmp_path):
+    unmasked = tmp_path / "data"
+    remove_feature(LeRobotDataset("tests/tiny", root=dataset), "observation.images.target_mask", output_dir=unmasked)
     for name, policy in (("new", NEW), ("tuned", [f"--policy.path={checkpoint}"])):
         with pytest.raises(ConfigurationError, match=r"no .*'observation.images.target_mask'.*withhold_mask=true"):
             train(unmasked, tmp_path / name, *policy, "--steps=1")

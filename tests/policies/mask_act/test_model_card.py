@@ -5,8 +5,7 @@ import pytest
 from huggingface_hub import ModelCard
 from lerobot.configs import PreTrainedConfig
 
-from lerobot_excav.policies import mask_act
-from lerobot_excav.policies.mask_act.model_card import TEMPLATE, CardFacts, model_card
+from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
 
 LANDED = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
 SETTINGS = {
@@ -31,11 +30,6 @@ def trained(tmp_path):
 
 def missing(card, *rows):
     return [row for row in rows if row not in str(card)]
-
-
-def test_the_template_lies_in_the_package_and_so_in_the_wheel():
-    assert TEMPLATE.parent == Path(mask_act.__file__).parent
-    assert TEMPLATE.is_file()
 
 
 def test_the_metadata_is_what_the_hub_reads(trained, tmp_path, config):
@@ -75,22 +69,15 @@ def test_the_card_counts_the_held_out_episodes_where_it_can(trained, config, dat
     assert missing(card, f"| Held out for validation | {held_out} |") == []
 
 
+NETWORK = ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]
+PLAIN = ["four-channel views; trained", "a fourth channel of the main camera. ", "| Coordinate channels | no |"]
+
+
 @pytest.mark.parametrize(
     ("settings", "rows"),
     [
-        ({}, ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]),
-        (
-            {},
-            [
-                "four-channel views; trained",
-                "a fourth channel of the main camera. ",
-                "Coordinate channels | no",
-            ],
-        ),
-        (
-            {"target_token": True},
-            ["main camera and a token pooled under the mask. ", "| Target token | yes |"],
-        ),
+        ({}, NETWORK + PLAIN),
+        ({"target_token": True}, ["main camera and a token pooled under the mask. ", "| Target token | yes |"]),
         ({"withhold_mask": True}, ["(`withhold_mask`): the no-condition variant. Weights"]),
         ({"coordinate_channels": True}, ["row and column of every pixel", "| Coordinate channels | yes |"]),
     ],

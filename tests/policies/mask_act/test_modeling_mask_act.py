@@ -40,6 +40,12 @@ def test_a_fresh_policy_equals_its_maskless_twin_bit_for_bit_and_training_wakes_
     assert stem(agent).weight.grad[:, 3].abs().max() > 0
 
 
+def test_a_fresh_target_token_sees_the_mask_before_the_stem_does(policy, batch, mask):
+    agent, observation = policy(target_token=True), batch()
+    moved = {**observation, MASK: mask(3, top=0, left=0)}
+    assert not torch.equal(agent.predict_action_chunk(observation), agent.predict_action_chunk(moved))
+
+
 @pytest.mark.parametrize("token", [False, True])
 def test_a_seen_mask_moves_the_plan_and_a_withheld_mask_leaves_no_trace_bit_for_bit(awake, batch, mask, token):
     observation, empty = batch(), torch.zeros_like(batch()[MASK])
@@ -54,25 +60,15 @@ def test_a_seen_mask_moves_the_plan_and_a_withheld_mask_leaves_no_trace_bit_for_
         assert torch.equal(blind.predict_action_chunk(observation), blind.predict_action_chunk(other))
 
 
-def test_the_target_token_sees_the_mask_before_the_stem_does(policy, batch, mask):
-    observation = batch()
-    moved = {**observation, MASK: mask(3, top=0, left=0)}
-    plain, token = policy(), policy(target_token=True)
-    assert torch.equal(plain.predict_action_chunk(observation), plain.predict_action_chunk(moved))
-    assert not torch.equal(token.predict_action_chunk(observation), token.predict_action_chunk(moved))
-
-
 @pytest.mark.parametrize("use_vae", [False, True])
 def test_forward_leaves_the_batch_alone_and_every_parameter_gets_a_gradient(policy, batch, use_vae):
     agent = policy(use_vae=use_vae, target_token=True).train()
     data, copy = batch(actions=True), batch(actions=True)
     for each in (data, copy):
         each[MASK][0] = 0.0  # one sample without a target trains the learned token
-    loss, parts = agent.forward(data)
-    loss.backward()
+    agent.forward(data)[0].backward()
     assert data.keys() == copy.keys()
     assert all(torch.equal(data[key], copy[key]) for key in copy)
-    assert ("kld_loss" in parts) == use_vae
     assert [name for name, p in agent.named_parameters() if p.grad is None] == []
 
 
@@ -82,16 +78,11 @@ def test_training_cuts_masks_of_lossy_videos_at_one_half(policy, batch):
     assert torch.equal(agent.forward(lossy)[0], agent.forward(data)[0])
 
 
-@pytest.mark.parametrize("weight", [0.0, 10.0])
-def test_kl_weight_scales_the_divergence(policy, batch, weight):
-    loss, parts = policy(use_vae=True, kl_weight=weight).train().forward(batch(actions=True))
-    assert parts["kld_loss"] > 0
-    assert loss.item() == pytest.approx(parts["l1_loss"] + weight * parts["kld_loss"], rel=1e-5)
-
-
-@pytest.mark.parametrize("use_vae", [False, True])
-def test_losses_per_sample_average_to_the_loss(policy, batch, use_vae):
-    agent, data = policy(use_vae=use_vae).train(), batch(actions=True)
+@pytest.mark.parametrize(("use_vae", "weight"), [(False, 10.0), (True, 0.0), (True, 10.0)])
+def test_the_loss_is_the_error_and_the_weighted_divergence_and_the_mean_of_those_per_sample(
+    policy, batch, use_vae, weight
+):
+    agent, data = policy(use_vae=use_vae, kl_weight=weight).train(), batch(actions=True)
     torch.manual_seed(1)
     mean, _ = agent.forward(data)
     torch.manual_seed(1)
@@ -99,6 +90,9 @@ def test_losses_per_sample_average_to_the_loss(policy, batch, use_vae):
     assert each.shape == (3,)
     torch.testing.assert_close(each.mean(), mean)
     assert isinstance(parts["l1_loss"], float)
+    divergence = parts["kld_loss"] if use_vae else 0.0
+    assert (divergence > 0) == use_vae
+    assert mean.item() == pytest.approx(parts["l1_loss"] + weight * divergence, rel=1e-5)
     with pytest.raises(ConfigurationError, match=r"reduction='sum'.*'mean', 'none'"):
         agent.forward(data, reduction="sum")
 

@@ -8,8 +8,7 @@ from .conftest import CAB, MAIN, MASK
 
 
 @pytest.mark.parametrize(
-    "convert",
-    [lambda m: m[:, :1], lambda m: (m * 255).to(torch.uint8), lambda m: m * 255, lambda m: m.bool()],
+    "convert", [lambda m: m[:, :1], lambda m: (m * 255).to(torch.uint8), lambda m: m * 255, lambda m: m.bool()]
 )
 def test_one_channel_bytes_and_booleans_are_the_same_mask(config, batch, convert):
     observation = batch()
@@ -49,11 +48,7 @@ def test_missing_pictures_are_named_with_what_to_do(config, batch):
 @pytest.mark.parametrize(
     ("key", "change", "message"),
     [
-        (
-            MASK,
-            lambda m: m[..., :-1],
-            r"target_mask has shape \(3, 3, 32, 47\).*main has shape \(3, 3, 32, 48\)",
-        ),
+        (MASK, lambda m: m[..., :-1], r"target_mask has shape \(3, 3, 32, 47\).*main has shape \(3, 3, 32, 48\)"),
         (MASK, lambda m: m[:, 0], r"shape \(3, 32, 48\).*must be \(3, 1, 32, 48\) or \(3, 3, 32, 48\)"),
         (MASK, lambda m: m[:, :2], r"shape \(3, 2, 32, 48\)"),
         (MASK, lambda m: m[:1], r"shape \(1, 3, 32, 48\)"),
