@@ -5,7 +5,7 @@ import os
 import platform
 from pathlib import Path
 
-from lerobot_excav.envs.tasks.scoop.simulation_version import SIMULATION_VERSION
+from lerobot_excav.envs.tasks.registry import task_spec
 
 from validation.soil.experiment import Conditions, SoilExperiment
 from validation.soil.plots import draw
@@ -64,7 +64,7 @@ def _introduction(conditions: Conditions, outcomes: list[Outcome]) -> str:
         + f"Conditions: soil `{conditions.preset}` where an experiment does not name its own, fidelity "
         f"`{conditions.fidelity}`, seeds {seeds}"
         + (", quick (fewer repetitions)" if conditions.quick else "")
-        + f"; lerobot_env_excav {importlib.metadata.version('lerobot_env_excav')}, version {SIMULATION_VERSION} "
+        + f"; lerobot_env_excav {importlib.metadata.version('lerobot_env_excav')}, version {task_spec('task', 'Scoop-v0').simulation_version} "
         "of the simulation, "
         f"{platform.machine()} with {os.cpu_count()} cores.\n\n"
         "How the soil works: [soil.md](soil.md). Every experiment is one file in "
