@@ -122,11 +122,7 @@ def timed_steps(soil: Soil, tools: list[Tool] | list[None]) -> tuple[Array, Arra
     for k, tool in enumerate(tools):
         start = time.perf_counter()
         soil.step(TICK_S, tool)
-        seen[:, k] = (
-            1e3 * (time.perf_counter() - start),
-            len(soil.parcel_masses_kg),
-            soil.awake_parcel_count,
-        )
+        seen[:, k] = (1e3 * (time.perf_counter() - start), len(soil.parcel_masses_kg), soil.awake_parcel_count)
     return seen[0], seen[1], seen[2]
 
 

@@ -122,10 +122,7 @@ def _published(aspects: list[float], *laws: Callable[[float], float]) -> list[Se
 
 def _points(label: str, runs: list[Collapse], name: str, color: int) -> Series:
     return Series(
-        label,
-        tuple(one.aspect for one in runs),
-        tuple(float(getattr(one, name)) for one in runs),
-        color=color,
+        label, tuple(one.aspect for one in runs), tuple(float(getattr(one, name)) for one in runs), color=color
     )
 
 

@@ -172,11 +172,7 @@ def _plot(heaps: list[Heap]) -> Plot:
         label = f"cone at {heap.repose_deg:.0f}°"
         curves.append(Series(label, radii, cone, style="dashed", color=k))
     return Plot(
-        "heap",
-        "A heap of 485 kg, mean of 8 azimuths",
-        "distance from the axis [m]",
-        "height [m]",
-        tuple(curves),
+        "heap", "A heap of 485 kg, mean of 8 azimuths", "distance from the axis [m]", "height [m]", tuple(curves)
     )
 
 

@@ -15,12 +15,7 @@ SCENES, QUICK_SCENES = 8, 2
 
 def run(conditions: Conditions) -> Result:
     """Let the scripted operator play validation scenes without pictures."""
-    env = {
-        "scene_set": "val",
-        "soil": conditions.preset,
-        "fidelity": conditions.fidelity,
-        "episode_length": 200,
-    }
+    env = {"scene_set": "val", "soil": conditions.preset, "fidelity": conditions.fidelity, "episode_length": 200}
     settings = DemonstrationSettings.of(
         "excavator", env, scenes=QUICK_SCENES if conditions.quick else SCENES, targets=1
     )

@@ -95,20 +95,11 @@ def scaling_plots(conditions: Conditions) -> tuple[Plot, Plot]:
     preset, seed, quick = conditions.preset, conditions.seeds[0], conditions.quick
     parcels = {name: parcel_scaling(preset, name, seed, quick=quick) for name in FIDELITIES}
     cells = {conditions.fidelity: grid_scaling(preset, conditions.fidelity, seed, quick=quick)}
-    title, y_label = (
-        "Step time and awake parcels, each fidelity up to its bound",
-        "computing time of a step [ms]",
-    )
+    title, y_label = ("Step time and awake parcels, each fidelity up to its bound", "computing time of a step [ms]")
     across = "cells along each side of the dig area"
     return (
         Plot("scaling", title, "awake parcels", y_label, _curves(parcels)),
-        Plot(
-            "scaling_grid",
-            "Mean step time of a dig cycle and size of the grid",
-            across,
-            y_label,
-            _curves(cells),
-        ),
+        Plot("scaling_grid", "Mean step time of a dig cycle and size of the grid", across, y_label, _curves(cells)),
     )
 
 

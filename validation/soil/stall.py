@@ -149,11 +149,7 @@ def _plot(digs: dict[str, Dig]) -> Plot:
         curves.append(Series(f"speed, {name} [m/s]", seconds, speed, style="line", color=k))
         curves.append(Series(f"force, {name} [10 kN]", seconds, force, style="dashed", color=k))
     return Plot(
-        "stall",
-        "Lower, drag, hold, drag on, lift",
-        "time [s]",
-        "speed of the edge [m/s]; force [10 kN]",
-        tuple(curves),
+        "stall", "Lower, drag, hold, drag on, lift", "time [s]", "speed of the edge [m/s]; force [10 kN]", tuple(curves)
     )
 
 

@@ -83,10 +83,7 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
         )
 
     def _validate_joystick(self) -> None:
-        maps = (
-            ("joystick_axes", self.joystick_axes, AXES),
-            ("joystick_buttons", self.joystick_buttons, self.buttons),
-        )
+        maps = (("joystick_axes", self.joystick_axes, AXES), ("joystick_buttons", self.joystick_buttons, self.buttons))
         for name, numbers, names in maps:
             if numbers is None:
                 continue

@@ -19,12 +19,7 @@ PATTERNS: Mapping[str, Mapping[str, tuple[str, float]]] = {
         "bucket": ("right_x", 1.0),  # lever left: curl, which is negative
     },
     # SAE J1814 ("backhoe"): boom and arm change hands.
-    "sae": {
-        "swing": ("left_x", -1.0),
-        "boom": ("left_y", 1.0),
-        "arm": ("right_y", -1.0),
-        "bucket": ("right_x", 1.0),
-    },
+    "sae": {"swing": ("left_x", -1.0), "boom": ("left_y", 1.0), "arm": ("right_y", -1.0), "bucket": ("right_x", 1.0)},
 }
 """For each joint of a control pattern, the axis that drives it and the axis' sign."""
 

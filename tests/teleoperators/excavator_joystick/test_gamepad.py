@@ -95,12 +95,7 @@ def test_devices_are_chosen_by_position_or_by_part_of_the_name():
     [
         ([], 0, None, "teleop.device_index=0 does not match a gamepad; connected: none. Plug one in"),
         (["Xbox Pad"], 1, None, "teleop.device_index=1 does not match a gamepad; connected: 0: 'Xbox Pad'"),
-        (
-            ["Xbox Pad"],
-            0,
-            "stick",
-            "teleop.device_name='stick' does not match a gamepad; connected: 0: 'Xbox",
-        ),
+        (["Xbox Pad"], 0, "stick", "teleop.device_name='stick' does not match a gamepad; connected: 0: 'Xbox"),
     ],
 )
 def test_a_missing_device_is_described(found, index, name, message):

@@ -26,14 +26,7 @@ def test_a_gate_is_put_into_words(low, high, text):
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [
-        (0.0, "0"),
-        (1474.0, "1474"),
-        (39.001, "39"),
-        (0.8765, "0.876"),
-        (4.2e-16, "4.2e-16"),
-        (-12.34, "-12.3"),
-    ],
+    [(0.0, "0"), (1474.0, "1474"), (39.001, "39"), (0.8765, "0.876"), (4.2e-16, "4.2e-16"), (-12.34, "-12.3")],
 )
 def test_numbers_are_shown_with_three_digits(value, text):
     assert number_text(value) == text
