@@ -22,10 +22,11 @@ Experiments:
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from pydantic_core import to_json
 
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS
 from lerobot_excav.errors import ConfigurationError, require
@@ -64,24 +65,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     outcomes: list[Outcome] = []
     for experiment in experiments:
         outcomes.append((experiment, experiment.run(conditions)))
-        print(summary_text(outcomes[-1:]), flush=True)
+        print(summary_text(*outcomes[-1]), flush=True)
     if given.json is not None:
-        _write_values(given.json, conditions, outcomes)
+        values = {name: getattr(given, name) for name in ("soil", "fidelity", "seeds", "quick")}
+        values["experiments"] = {experiment.code: result.as_dict() for experiment, result in outcomes}
+        given.json.write_bytes(to_json(values, indent=1, inf_nan_mode="null") + b"\n")
     if given.report:
         path = given.out or REPORT
         write_report(outcomes, conditions, path)
         print(f"written: {path}")
-    return int(any(not result.passed for experiment, result in outcomes if not experiment.is_timed))
+    return int(any(result.missed for experiment, result in outcomes if not experiment.is_timed))
 
 
 def _check_files(given: argparse.Namespace) -> None:
     """Refuse what cannot be written before the experiments run, not after; a part must not replace the report."""
     require(given.out is None or given.report, "--out names the report; add --report")
     if given.report and given.out is None:
-        default = _parser().parse_args([])
         for name in ("only", "soil", "fidelity", "seeds", "quick"):
             require(
-                getattr(given, name) == getattr(default, name),
+                getattr(given, name) == _parser().get_default(name),
                 f"--{name} with --report would replace {REPORT} by another report; add --out=FILE",
             )
     for path in (given.json, given.out):
@@ -95,17 +97,6 @@ def _seeds(text: str) -> tuple[int, ...]:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r}; give whole numbers, as in --seeds=0,1,2") from None
-
-
-def _write_values(path: Path, conditions: Conditions, outcomes: list[Outcome]) -> None:
-    values = {
-        "soil": conditions.preset,
-        "fidelity": conditions.fidelity,
-        "seeds": conditions.seeds,
-        "quick": conditions.quick,
-        "experiments": {experiment.code: result.as_dict() for experiment, result in outcomes},
-    }
-    path.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n")
 
 
 if __name__ == "__main__":

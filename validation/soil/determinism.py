@@ -4,9 +4,9 @@ import hashlib
 
 import numpy as np
 
-from bench.soil import cone
+from bench.soil import cone, pile
 from lerobot_excav.envs.soil import Soil
-from validation.soil.dig_runs import cases, dig, prepared_soil
+from validation.soil.dig_runs import cases, dig
 from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
 
@@ -26,13 +26,13 @@ def run(conditions: Conditions) -> Result:
     rows: list[tuple[float | str, ...]] = []
     different = unequal = 0
     for preset, fidelity in track(cases(conditions), "T13 repeats"):
-        soil = prepared_soil(preset, fidelity, conditions.seeds[0])
+        soil = pile(preset, fidelity, conditions.seeds[0])
         first = trace(soil, quick=conditions.quick)
         heights = cone(soil)
         soil.reset(heights)
         unequal += soil.heights_m.tobytes() != heights.tobytes()
         again = trace(soil, quick=conditions.quick)
-        other = trace(prepared_soil(preset, fidelity, conditions.seeds[0]), quick=conditions.quick)
+        other = trace(pile(preset, fidelity, conditions.seeds[0]), quick=conditions.quick)
         different += (again != first) + (other != first)
         rows.append((preset, fidelity, first, again, other))
     return Result(

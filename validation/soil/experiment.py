@@ -33,6 +33,11 @@ class Conditions:
         require(len(self.seeds) >= 1, "--seeds is empty; give at least one, as in --seeds=0")
         require(min(self.seeds) >= 0, f"--seeds={self.seeds}; allowed: 0 and above")
 
+    @property
+    def repeats(self) -> tuple[int, ...]:
+        """The seeds with which an experiment is repeated."""
+        return self.seeds[:1] if self.quick else self.seeds
+
 
 @dataclass(frozen=True, kw_only=True)
 class SoilExperiment:
@@ -57,6 +62,12 @@ class SoilExperiment:
     run: Callable[[Conditions], Result]
     reasons: dict[str, str] = field(default_factory=dict)
     is_timed: bool = False
+
+    @property
+    def anchor(self) -> str:
+        """Where a link to its section of the report leads, as Markdown names it."""
+        title = f"{self.code} {self.title}".lower().replace(" ", "-")
+        return "".join(c for c in title if c.isalnum() or c == "-")
 
     def reason(self, check: Check) -> str:
         """Return why a check may miss; empty if nobody has found out."""

@@ -9,7 +9,8 @@ from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
 from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 Array = NDArray[np.float64]
 
@@ -74,13 +75,8 @@ def _table(soil: Soil) -> Table:
 
 def _plot(depths: Array, forces: dict[float, Array]) -> Plot:
     curves = (Series(f"rake {rake:.0f}°", depths, force, style="line") for rake, force in forces.items())
-    return Plot(
-        "force_ramp",
-        "Force on a bucket that is dragged level",
-        "depth of the cutting edge [m]",
-        "force [N]",
-        tuple(curves),
-    )
+    title, x_label = "Force on a bucket that is dragged level", "depth of the cutting edge [m]"
+    return Plot("force_ramp", title, x_label, "force [N]", tuple(curves))
 
 
 EXPERIMENT = SoilExperiment(

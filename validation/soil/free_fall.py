@@ -9,7 +9,8 @@ from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import Soil
 from validation.soil.arrangement import cylinder
 from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 Array = NDArray[np.float64]
 
@@ -69,10 +70,10 @@ def mechanical_energy_j(soil: Soil) -> float:
 
 
 def drift_in_the_air_m(*, preset: str, fidelity: str, seed: int) -> tuple[float, float]:
-    """Let a contracting cloud fall until just before it lands.
+    """Let a contracting cloud fall until just before it lands; measure the path of its centre of mass.
 
     Returns:
-        Horizontal drift of the centre of mass, and its vertical distance from the parabola, both [m].
+        Horizontal drift, and vertical distance from the parabola, both [m].
     """
     soil = Soil(preset, (4.0, 4.0), 0.05, fidelity, seed)
     cloud(soil, np.random.default_rng(seed), height_m=CLOUD_HEIGHT_M)
@@ -101,11 +102,9 @@ def run(conditions: Conditions) -> Result:
     """Drop single parcels and clouds."""
     common = {"preset": conditions.preset, "fidelity": conditions.fidelity}
     times = [(h, fall_time_s(h, **common), math.sqrt(2.0 * h / GRAVITY_M_S2)) for h in HEIGHTS_M]
-    seeds = conditions.seeds[:1] if conditions.quick else conditions.seeds
-    drifts, dumps = [], []
-    for seed in track(seeds, "T11 clouds"):
-        drifts.append(drift_in_the_air_m(**common, seed=seed))
-        dumps.append(energies_of_a_dump_j(**common, seed=seed))
+    seeds = conditions.repeats
+    drifts = [drift_in_the_air_m(**common, seed=seed) for seed in track(seeds, "T11 clouds in the air")]
+    dumps = [energies_of_a_dump_j(**common, seed=seed) for seed in track(seeds, "T11 dumps")]
     drift = max(horizontal for horizontal, _ in drifts)
     time_error = max(abs(found / law - 1.0) for _, found, law in times)
     growth = max(float(np.diff(energies).max()) / float(energies[0]) for energies in dumps)
@@ -130,13 +129,8 @@ def run(conditions: Conditions) -> Result:
 
 def _plot(energies: Array) -> Plot:
     times = TICK_S * np.arange(len(energies))
-    return Plot(
-        "dump_energy",
-        "Energy of a dump",
-        "time [s]",
-        "kinetic and potential energy [J]",
-        (Series("parcels and grid", times, energies, style="line"),),
-    )
+    curve = Series("parcels and grid", times, energies, "line")
+    return Plot("dump_energy", "Energy of a dump", "time [s]", "kinetic and potential energy [J]", (curve,))
 
 
 EXPERIMENT = SoilExperiment(

@@ -2,7 +2,8 @@
 
 import math
 
-from validation.soil.dig_runs import cases, dig, prepared_soil
+from bench.soil import pile
+from validation.soil.dig_runs import cases, dig
 from validation.soil.experiment import Conditions, SoilExperiment, track
 from validation.soil.results import Check, Result, Table
 
@@ -14,7 +15,7 @@ def run(conditions: Conditions) -> Result:
     rows: list[tuple[float | str, ...]] = []
     worst, lowest, least = 0.0, math.inf, math.inf
     for preset, fidelity in track(cases(conditions), "T12 ledgers"):
-        soil = prepared_soil(preset, fidelity, conditions.seeds[0])
+        soil = pile(preset, fidelity, conditions.seeds[0])
         total, error = sum(soil.ledger_kg().values()), 0.0
         for _ in dig(soil, quick=conditions.quick):
             entries = soil.ledger_kg().values()

@@ -21,17 +21,6 @@ def share_radius(radii_m: Array, masses_kg: Array, share: float) -> float:
     return float(np.interp(share * reached[-1], reached, radii_m[order]))
 
 
-def field_radius(heights_m: Array, radii_m: Array, share: float) -> float:
-    """Return the mass radius [m] of a height field.
-
-    Args:
-        heights_m: (nx, ny) heights.
-        radii_m: (nx, ny) distances of the cells from the axis.
-        share: In (0, 1).
-    """
-    return share_radius(radii_m.ravel(), heights_m.ravel(), share)
-
-
 def mass_radius(soil: Soil, share: float) -> float:
     """Return the radius [m] about the z axis that holds a share of the soil on the ground and in parcels."""
     x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
