@@ -9,7 +9,7 @@ _FILES = (
     *("column_collapse", "heap", "blade_force", "earthmoving_factors", "operator_cycle", "free_fall"),
     *("ledger", "determinism", "speed", "stall", "force_ramp"),
 )
-EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").EXPERIMENT for f in _FILES)
+EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 
 
 def chosen(codes: str | None) -> list[SoilExperiment]:

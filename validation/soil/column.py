@@ -8,8 +8,8 @@ import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters, relax
+from validation import Array
 from validation.soil.arrangement import cylinder
-from validation.soil.mass_radius import mass_radius, share_radius
 from validation.soil.resting import steps_until_rest
 
 MASS_SHARE = 0.99
@@ -29,7 +29,7 @@ class Collapse(NamedTuple):
     run_out: float  # (r - r0) / r0 of the mass radius
     height: float  # final height over initial radius
     stop_time: float  # until the radius is within 2 % of its last value, over sqrt(h0 / g)
-    parcel_count: int
+    parcel_count: float
     cone_run_out: float  # of the same column in a height field that only relaxes
 
 
@@ -42,14 +42,7 @@ def sand_with_friction(friction_deg: float) -> SoilParameters:
 
 
 def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: int) -> Collapse:
-    """Release a column on an empty floor and wait until everything rests.
-
-    Args:
-        parameters: The soil.
-        aspect: Height over radius to aim at; layers of parcels are whole.
-        fidelity: Numerical effort.
-        seed: Seed of the arrangement.
-    """
+    """Release a column on an empty floor and wait until everything rests; its aspect is met to a layer of parcels."""
     radius = min(RADIUS_M, (VOLUME_LIMIT_M3 / (math.pi * aspect)) ** (1.0 / 3.0))
     soil = Soil(parameters, (6.0, 6.0), 0.05, fidelity, seed)
     points = cylinder(radius, aspect * radius, soil, np.random.default_rng(seed))
@@ -77,3 +70,24 @@ def _cone_radius(soil: Soil, radius_m: float, height_m: float) -> float:
     volume = math.pi * radius_m**2 * height_m
     rested = relax(inside * volume / (inside.sum() * cell**2), cell, soil.parameters.slope_tan)
     return share_radius(radii_m.ravel(), rested.ravel(), MASS_SHARE)
+
+
+def share_radius(radii_m: Array, masses_kg: Array, share: float) -> float:
+    """Return the radius [m] that holds a share in (0, 1) of (n,) masses, linear between the sorted (n,) radii."""
+    order = np.argsort(radii_m)
+    reached = np.cumsum(masses_kg[order])
+    return float(np.interp(share * reached[-1], reached, radii_m[order]))
+
+
+def mass_radius(soil: Soil, share: float) -> float:
+    """Return the radius [m] about the z axis that holds a share of the soil on the ground and in parcels."""
+    x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
+    heights = soil.heights_m
+    total = float(heights.sum())
+    cell_kg = soil.ledger_kg()["grid"] / total if total > 0.0 else 0.0
+    parcels = soil.parcel_positions_w
+    return share_radius(
+        np.concatenate([np.hypot(x, y).ravel(), np.hypot(parcels[:, 0], parcels[:, 1])]),
+        np.concatenate([heights.ravel() * cell_kg, soil.parcel_masses_kg]),
+        share,
+    )

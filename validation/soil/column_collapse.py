@@ -7,9 +7,9 @@ ones. A height field that only relaxes to its repose angle has no inertia: it en
 
 import numpy as np
 
-from validation.soil import column_laws as laws
 from validation.soil.column import Collapse, collapse, sand_with_friction
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.column_laws import LAJEUNESSE, LUBE, cone_run_out, power_law
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.plots import Plot, Series
 from validation.soil.results import Check, Result, Table
 
@@ -30,6 +30,15 @@ Found = dict[float, list[list[Collapse]]]
 """Repeated collapses, by friction angle and in the order of the aspect ratios."""
 
 
+@experiment(
+    code="T1",
+    title="Collapse of a column",
+    source="Lube et al. 2004, J. Fluid Mech. 508:175; Lajeunesse et al. 2004, Phys. Fluids 16:2371",
+    measures="Parcels fill a cylinder on an empty floor and are let go. The run-out is that of the radius that holds "
+    "99 % of the mass once all of it lies in the grid. Sand at 39°, and the same sand at 30°.",
+    gate="exponent 1 ± 0.25 for a ≤ 1.5 and 0.5 ± 0.2 for a ≥ 2; prefactor 0.5 to 1.6 at 39° and 0.9 to 1.6 at 30°; "
+    "a height field without inertia must be told apart",
+)
 def run(conditions: Conditions) -> Result:
     """Release columns of sand with two friction angles."""
     low = QUICK_LOW_ASPECTS if conditions.quick else LOW_ASPECTS
@@ -39,14 +48,13 @@ def run(conditions: Conditions) -> Result:
         sand = sand_with_friction(phi)
         runs = [collapse(sand, aspect, fidelity=conditions.fidelity, seed=seed) for seed in conditions.repeats]
         found.setdefault(phi, []).append(runs)
+    repeats = len(conditions.repeats)
     counts = [one.parcel_count for groups in found.values() for runs in groups for one in runs]
     return Result(
         checks=tuple(check for phi in FRICTIONS_DEG for check in _checks(phi, found[phi], len(low))),
         tables=(_table(found), _fit_table(found, len(low))),
         plots=_plots(found),
-        remarks=(
-            f"{min(counts)} to {max(counts)} parcels per column, {len(conditions.repeats)} arrangement(s) of each.",
-        ),
+        remarks=(f"{min(counts):.0f} to {max(counts):.0f} parcels per column, {repeats} arrangement(s) of each.",),
     )
 
 
@@ -57,7 +65,7 @@ def _mean(runs: list[Collapse]) -> Collapse:
 def _fits(groups: list[list[Collapse]], low: int) -> tuple[float, ...]:
     """Return prefactor and exponent of the first `low` groups, which are low columns, and those of the others."""
     parts = ([_mean(runs) for runs in part] for part in (groups[:low], groups[low:]))
-    fits = [laws.power_law([one.aspect for one in part], [one.run_out for one in part]) for part in parts]
+    fits = [power_law([one.aspect for one in part], [one.run_out for one in part]) for part in parts]
     return (*fits[0], *fits[1])
 
 
@@ -86,30 +94,28 @@ def _table(found: Found) -> Table:
         for runs in groups:
             a, run_out, height, stop_time, _, cone = _mean(runs)
             spread = float(np.ptp([one.run_out for one in runs]))
-            run_outs = (run_out, spread, laws.lube_run_out(a), laws.lajeunesse_run_out(a), cone)
-            rows.append((phi, a, *run_outs, height, laws.lube_height(a), laws.lajeunesse_height(a), stop_time))
+            run_outs = (run_out, spread, LUBE.run_out(a), LAJEUNESSE.run_out(a), cone)
+            rows.append((phi, a, *run_outs, height, LUBE.height(a), LAJEUNESSE.height(a), stop_time))
     return Table(header, tuple(rows))
 
 
 def _fit_table(found: Found, low: int) -> Table:
-    ours = tuple((f"this soil, {phi:.0f}°", *_fits(groups, low)) for phi, groups in found.items())
-    published = (("Lube et al. 2004", *laws.LUBE_FIT), ("Lajeunesse et al. 2004", *laws.LAJEUNESSE_FIT))
+    ours = ((f"this soil, {phi:.0f}°", *_fits(groups, low)) for phi, groups in found.items())
+    published = ((f"{law.label} et al. 2004", law.low, 1.0, law.tall, 0.5) for law in (LUBE, LAJEUNESSE))
     header = ("", "prefactor, low", "exponent, low", "prefactor, tall", "exponent, tall")
     return Table(header, (*ours, *published))
 
 
 def _plots(found: Found) -> tuple[Plot, Plot]:
     aspects = [float(a) for a in np.geomspace(0.4, 4.5, 80)]
-    run_out, height = (
-        [
-            Series(label, aspects, [law(a) for a in aspects], "line", color=color)
-            for color, (label, law) in enumerate(zip(("Lube 2004", "Lajeunesse 2004"), pair, strict=True))
-        ]
-        for pair in ((laws.lube_run_out, laws.lajeunesse_run_out), (laws.lube_height, laws.lajeunesse_height))
-    )
+    run_out, height = [], []
+    for k, law in enumerate((LUBE, LAJEUNESSE)):
+        label = f"{law.label} 2004"
+        run_out.append(Series(label, aspects, [law.run_out(a) for a in aspects], "line", color=k))
+        height.append(Series(label, aspects, [law.height(a) for a in aspects], "line", color=k))
     for k, (phi, groups) in enumerate(found.items(), 2):
         a, run_outs, heights, *_ = zip(*(one for runs in groups for one in runs), strict=True)
-        cone = [laws.cone_run_out(aspect, phi) for aspect in aspects]
+        cone = [cone_run_out(aspect, phi) for aspect in aspects]
         run_out.append(Series(f"this soil, {phi:.0f}°", a, run_outs, color=k))
         run_out.append(Series(f"height field alone: cone, {phi:.0f}°", aspects, cone, "dashed", color=k))
         height.append(Series(f"this soil, {phi:.0f}°", a, heights, color=k))
@@ -118,15 +124,3 @@ def _plots(found: Found) -> tuple[Plot, Plot]:
         Plot("column_run_out", f"{title}: run-out", x_label, "(r − r₀) / r₀", tuple(run_out), logarithmic=True),
         Plot("column_height", f"{title}: final height", x_label, "h / r₀", tuple(height), logarithmic=True),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T1",
-    title="Collapse of a column",
-    source="Lube et al. 2004, J. Fluid Mech. 508:175; Lajeunesse et al. 2004, Phys. Fluids 16:2371",
-    measures="Parcels fill a cylinder on an empty floor and are let go. The run-out is that of the radius that holds "
-    "99 % of the mass once all of it lies in the grid. Sand at 39°, and the same sand at 30°.",
-    gate="exponent 1 ± 0.25 for a ≤ 1.5 and 0.5 ± 0.2 for a ≥ 2; prefactor 0.5 to 1.6 at 39° and 0.9 to 1.6 at 30°; "
-    "a height field without inertia must be told apart",
-    run=run,
-)

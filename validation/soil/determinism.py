@@ -7,7 +7,7 @@ import numpy as np
 from bench.soil import cone, pile
 from lerobot_excav.envs.soil import Soil
 from validation.soil.dig_runs import cases, dig
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
 
 
@@ -21,6 +21,14 @@ def trace(soil: Soil, *, quick: bool) -> str:
     return digest.hexdigest()[:16]
 
 
+@experiment(
+    code="T13",
+    title="Determinism",
+    source="Repeatability of an experiment",
+    measures="A dig cycle, the same again after a reset, and the same in another soil object, for every soil and "
+    "fidelity.",
+    gate="bit-equal traces; a reset gives the heights back byte for byte",
+)
 def run(conditions: Conditions) -> Result:
     """Dig the same cycle in two soils and once more after a reset, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
@@ -46,14 +54,3 @@ def run(conditions: Conditions) -> Result:
             "version of the code and to one kind of processor.",
         ),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T13",
-    title="Determinism",
-    source="Repeatability of an experiment",
-    measures="A dig cycle, the same again after a reset, and the same in another soil object, for every soil and "
-    "fidelity.",
-    gate="bit-equal traces; a reset gives the heights back byte for byte",
-    run=run,
-)

@@ -3,16 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import Soil
+from validation import Array
 from validation.soil.arrangement import cylinder
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.plots import Plot, Series
 from validation.soil.results import Check, Result, Table
-
-Array = NDArray[np.float64]
 
 HEIGHTS_M = (0.25, 0.5, 1.0, 2.0)
 
@@ -98,6 +96,19 @@ def energies_of_a_dump_j(*, preset: str, fidelity: str, seed: int) -> Array:
     return np.array(energies)
 
 
+@experiment(
+    code="T11",
+    title="Free fall and dump",
+    source="Mechanics: t = √(2h/g); the centre of mass of a cloud is moved by gravity only; friction takes energy",
+    measures="Single parcels fall from 0.25 m to 2 m. A contracting cloud of parcels collides with itself in the air "
+    "2 m above the ground. Another is dropped from 1 m, lands, spreads and rests.",
+    gate="fall time (1 %, our own tolerance); drift of the centre of mass 0; energy never grows",
+    reasons={
+        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step "
+        "and give part of it back in the next; kinetic and potential energy leave out what they hold meanwhile. "
+        "Their sum never rises above its start."
+    },
+)
 def run(conditions: Conditions) -> Result:
     """Drop single parcels and clouds."""
     common = {"preset": conditions.preset, "fidelity": conditions.fidelity}
@@ -131,19 +142,3 @@ def _plot(energies: Array) -> Plot:
     times = TICK_S * np.arange(len(energies))
     curve = Series("parcels and grid", times, energies, "line")
     return Plot("dump_energy", "Energy of a dump", "time [s]", "kinetic and potential energy [J]", (curve,))
-
-
-EXPERIMENT = SoilExperiment(
-    code="T11",
-    title="Free fall and dump",
-    source="Mechanics: t = √(2h/g); the centre of mass of a cloud is moved by gravity only; friction takes energy",
-    measures="Single parcels fall from 0.25 m to 2 m. A contracting cloud of parcels collides with itself in the air "
-    "2 m above the ground. Another is dropped from 1 m, lands, spreads and rests.",
-    gate="fall time (1 %, our own tolerance); drift of the centre of mass 0; energy never grows",
-    run=run,
-    reasons={
-        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step "
-        "and give part of it back in the next; kinetic and potential energy leave out what they hold meanwhile. "
-        "Their sum never rises above its start."
-    },
-)

@@ -5,16 +5,14 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation import Array
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.plots import Plot, Series
 from validation.soil.resting import steps_until_rest
 from validation.soil.results import Check, Result, Table
-
-Array = NDArray[np.float64]
 
 MASS_KG = 485.0
 """A bucket of sand."""
@@ -101,6 +99,22 @@ def _profile(soil: Soil, reach_m: float) -> Array:
     return np.stack([radii, soil.height_at(directions[:, None] * radii[:, None]).mean(axis=0)])
 
 
+SLOPE_OF_PARCELS = (
+    "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the height "
+    "field only take what is steeper than the preset's angle; they cannot steepen a flank."
+)
+
+
+@experiment(
+    code="T3",
+    title="Heap and repose",
+    source="The cone of a volume V: h = (3 V tan² θ / π)^(1/3); repose angle of the preset, as AGX Terrain takes it",
+    measures="485 kg leave a funnel whose mouth stands still 0.15 m above the top of the ideal cone. Straight lines "
+    "through the flank between a quarter and three quarters of the cone's radius in 8 sectors, each the mean of the "
+    "pours with different seeds; every soil.",
+    gate="the preset's angle ± 2° in 8 azimuths; mass error below 1e-9",
+    reasons=dict.fromkeys(("gentlest flank", "steepest flank"), SLOPE_OF_PARCELS),
+)
 def run(conditions: Conditions) -> Result:
     """Pour a heap of every soil; of sand also with half the time step."""
     seeds = conditions.repeats
@@ -149,21 +163,3 @@ def _plot(heaps: list[Heap]) -> Plot:
         curves.append(Series(f"cone at {heap.repose_deg:.0f}°", radii, cone, "dashed", color=k))
     title = "A heap of 485 kg, mean of 8 azimuths"
     return Plot("heap", title, "distance from the axis [m]", "height [m]", tuple(curves))
-
-
-SLOPE_OF_PARCELS = (
-    "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the height "
-    "field only take what is steeper than the preset's angle; they cannot steepen a flank."
-)
-
-EXPERIMENT = SoilExperiment(
-    code="T3",
-    title="Heap and repose",
-    source="The cone of a volume V: h = (3 V tan² θ / π)^(1/3); repose angle of the preset, as AGX Terrain takes it",
-    measures="485 kg leave a funnel whose mouth stands still 0.15 m above the top of the ideal cone. Straight lines "
-    "through the flank between a quarter and three quarters of the cone's radius in 8 sectors, each the mean of the "
-    "pours with different seeds; every soil.",
-    gate="the preset's angle ± 2° in 8 azimuths; mass error below 1e-9",
-    run=run,
-    reasons=dict.fromkeys(("gentlest flank", "steepest flank"), SLOPE_OF_PARCELS),
-)

@@ -4,12 +4,20 @@ import math
 
 from bench.soil import pile
 from validation.soil.dig_runs import cases, dig
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
 
 TOLERANCE_KG = 1e-6
 
 
+@experiment(
+    code="T12",
+    title="Mass ledger",
+    source="Conservation of mass",
+    measures="Grid, parcels, bucket, box and out of bounds are added up after every step of a dig cycle with a dump "
+    "into the box, for every soil and fidelity.",
+    gate="the sum is constant to 1e-6 kg in every step; no entry and no height is ever negative",
+)
 def run(conditions: Conditions) -> Result:
     """Add the ledger up after every step of a dig cycle, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
@@ -33,14 +41,3 @@ def run(conditions: Conditions) -> Result:
         ),
         tables=(Table(header, tuple(rows)),),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T12",
-    title="Mass ledger",
-    source="Conservation of mass",
-    measures="Grid, parcels, bucket, box and out of bounds are added up after every step of a dig cycle with a dump "
-    "into the box, for every soil and fidelity.",
-    gate="the sum is constant to 1e-6 kg in every step; no entry and no height is ever negative",
-    run=run,
-)

@@ -49,7 +49,7 @@ def draw(plot: Plot, path: Path) -> None:
     figure = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
     axes = figure.subplots()
     for number, curve in enumerate(plot.curves):
-        look = {"color": f"C{number if curve.color is None else curve.color}", "label": curve.label}
+        look: dict[str, Any] = {"color": f"C{number if curve.color is None else curve.color}", "label": curve.label}
         if curve.y_high is None:
             axes.plot(curve.x, curve.y, **look, **_STYLES[curve.style])
         else:

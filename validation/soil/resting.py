@@ -8,10 +8,7 @@ from lerobot_excav.envs.soil import Soil
 def steps_until_rest(soil: Soil, *, dt_s: float, limit_s: float) -> Iterator[int]:
     """Step a soil until no parcel is left and no height changes; yield the number of every step after it, from 1 on.
 
-    Args:
-        soil: The soil; parcels may be added between the steps.
-        dt_s: Time step.
-        limit_s: When to give up.
+    Parcels may be added between the steps. It gives up after a limit.
     """
     before = b""
     for number in range(1, round(limit_s / dt_s) + 1):

@@ -81,4 +81,4 @@ def scaling_plots(conditions: Conditions) -> tuple[Plot, Plot]:
 
 
 def _curves(series: dict[str, list[StepTime]]) -> tuple[Series, ...]:
-    return tuple(Series(name, *zip(*times, strict=True), "line") for name, times in series.items())
+    return tuple(Series(name, *np.transpose(times), "line") for name, times in series.items())

@@ -5,17 +5,15 @@ import platform
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.soil import StepTimes, dig_cycle, pile, quickest_steps, timed_steps
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
-from validation.soil.experiment import Conditions, SoilExperiment
+from validation import Array
+from validation.soil.experiment import Conditions, experiment
 from validation.soil.plots import Plot, Series
 from validation.soil.results import Check, Result, Table
 from validation.soil.scaling import add_column, scaling_plots
-
-Array = NDArray[np.float64]
 
 CARRY_TICKS = slice(350, 500)
 """The bucket is lifted and swung to the box."""
@@ -29,6 +27,22 @@ _FALL_TICKS = 12
 """A column of parcels falls apart: all of them touch, and few have become ground yet."""
 
 
+@experiment(
+    code="T14",
+    title="Speed",
+    source="Needs of training and of a person at the controls",
+    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "
+    "growing size (the quickest of three runs of each step).",
+    gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
+    "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
+    is_timed=True,
+    reasons={
+        "real time over the mean step": "From the first cut to the end of the curl all parcels in the bucket move, and "
+        "their sub-steps take most of the time.",
+        "half of the steps while carrying": "The swing of this cycle accelerates enough to wake the load several "
+        "times, and while it sleeps its parcels are still carried along one by one.",
+    },
+)
 def run(conditions: Conditions) -> Result:
     """Time a dig cycle and the first moments of a falling column."""
     preset, fidelity, seed = conditions.preset, conditions.fidelity, conditions.seeds[0]
@@ -77,22 +91,3 @@ def _plot(cycle: StepTimes) -> Plot:
     )
     y_label = "computing time [ms]; awake parcels / 100"
     return Plot("step_times", "Step times of a dig cycle", "time in the cycle [s]", y_label, curves)
-
-
-EXPERIMENT = SoilExperiment(
-    code="T14",
-    title="Speed",
-    source="Needs of training and of a person at the controls",
-    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "
-    "growing size (the quickest of three runs of each step).",
-    gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
-    "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
-    run=run,
-    is_timed=True,
-    reasons={
-        "real time over the mean step": "From the first cut to the end of the curl all parcels in the bucket move, and "
-        "their sub-steps take most of the time.",
-        "half of the steps while carrying": "The swing of this cycle accelerates enough to wake the load several "
-        "times, and while it sleeps its parcels are still carried along one by one.",
-    },
-)

@@ -11,11 +11,10 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation import Array
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.plots import Plot, Series
 from validation.soil.results import Check, Result, Table
-
-Array = NDArray[np.float64]
 
 START_RAD = np.array([0.0, 0.6, -1.2, -0.8])
 GROUND_M = 0.6
@@ -89,6 +88,15 @@ def _arm_direction(machine: ExcavatorMachine) -> Array:
     return direction
 
 
+@experiment(
+    code="T15",
+    title="Stall and energy",
+    source="Mechanics: resistance is no drive; friction holds what rests",
+    measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
+    "soil, and in ground so hard that it stalls. The load is left out, so that the resistance is the only force from "
+    "outside; its power at the end of every tick.",
+    gate="the soil never reverses the blade, a bucket held in it stays, and no force puts energy into the machine",
+)
 def run(conditions: Conditions) -> Result:
     """Dig in the soil and in hard ground."""
     parameters = PRESETS[conditions.preset]
@@ -127,15 +135,3 @@ def _plot(digs: dict[str, Dig]) -> Plot:
     return Plot(
         "stall", "Lower, drag, hold, drag on, lift", "time [s]", "speed of the edge [m/s]; force [10 kN]", tuple(curves)
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T15",
-    title="Stall and energy",
-    source="Mechanics: resistance is no drive; friction holds what rests",
-    measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
-    "soil, and in ground so hard that it stalls. The load is left out, so that the resistance is the only force from "
-    "outside; its power at the end of every tick.",
-    gate="the soil never reverses the blade, a bucket held in it stays, and no force puts energy into the machine",
-    run=run,
-)
