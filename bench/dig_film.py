@@ -5,10 +5,8 @@ python -m bench.dig_film outputs/dig.mp4
 
 import sys
 from collections.abc import Iterator
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,46 +14,20 @@ from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
+from lerobot_excav.evaluation.video import write_video
 
 FRAMES_PER_SECOND = 20
 """With one tick to a picture, 2.5 times slower than real time."""
 
 _QUICK_TICKS = 6
 _MOVING_KG = 2.0
-_QUALITY = 24  # constant rate factor of x264: 18 is lossless to the eye, 28 coarse
+_QUALITY = 24
 _SCENE, _TARGET = 3, 2
 _LONGEST_S = 40
 
-Image = NDArray[np.uint8]
-
-
-def write_video(path: Path, *, height: int = 480, width: int = 848) -> None:
-    """Film the scripted operator's cycle in a scene of the set `train` from the side.
-
-    The file appears when the film is complete.
-
-    Args:
-        path: File to write (mp4); its folder is made.
-        height: Height of the picture [px], even.
-        width: Width of the picture [px], even.
-
-    Raises:
-        RenderingError: Pictures cannot be made on this machine.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    with av.open(str(partial), mode="w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(FRAMES_PER_SECOND))
-        stream.height, stream.width, stream.pix_fmt = height, width, "yuv420p"
-        stream.options = {"crf": str(_QUALITY)}
-        for image in _pictures(height, width):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode(None))
-    partial.replace(path)
-
 
 def ticks_per_picture(phase: str, *, payload_kg: float, airborne_kg: float) -> int:
-    """Return how far to go on to the next picture: one tick while soil moves, more between.
+    """Return how many ticks pass until the next picture: one while soil moves, more between.
 
     Args:
         phase: What the operator is doing.
@@ -66,8 +38,12 @@ def ticks_per_picture(phase: str, *, payload_kg: float, airborne_kg: float) -> i
     return 1 if loads or airborne_kg > _MOVING_KG else _QUICK_TICKS
 
 
-def _pictures(height: int, width: int) -> Iterator[Image]:
-    """Play the cycle tick by tick and yield the pictures of the film."""
+def pictures(height: int = 480, width: int = 848) -> Iterator[NDArray[np.uint8]]:
+    """Play the scripted operator's cycle in a scene of the set `train`; yield the film, (height, width, 3) each.
+
+    Raises:
+        RenderingError: Pictures cannot be made on this machine.
+    """
     env = ExcavatorEnv(obs_type="agent_pos", fps=TICKS_PER_SECOND)
     env.reset(options={"scene_id": _SCENE, "target_id": _TARGET})
     operator = DigOperator(rng=np.random.default_rng(0))
@@ -90,4 +66,4 @@ def _pictures(height: int, width: int) -> Iterator[Image]:
 if __name__ == "__main__":
     if len(sys.argv) != 2 or not sys.argv[1].endswith(".mp4"):
         sys.exit("Give one file that ends in .mp4: python -m bench.dig_film outputs/dig.mp4")
-    write_video(Path(sys.argv[1]))
+    write_video(Path(sys.argv[1]), pictures(), FRAMES_PER_SECOND, crf=_QUALITY)

@@ -107,9 +107,7 @@ def measure(*, rounds: int, batch_size: int = 32, height: int = 96, width: int =
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
-        prog="python -m bench.policy",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog="python -m bench.policy", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="two rounds in place of five")
     torch.set_num_threads(2)

@@ -11,8 +11,7 @@ from PIL import Image
 
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator import ScriptedOperator
-from lerobot_excav.envs.tasks.scoop.targets import target_mask_img
+from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 
 TINT_RGB = np.array([235, 60, 40])
 
@@ -21,15 +20,14 @@ def main(path: Path, scene_id: int, target_id: int) -> None:
     """Play one cycle until the bucket comes up full, and save the main view beside the cab's."""
     env = ExcavatorEnv(scene_set="train", obs_type="agent_pos")
     env.reset(options={"scene_id": scene_id, "target_id": target_id})
-    operator = ScriptedOperator(rng=np.random.default_rng(0))
+    operator = DigOperator(rng=np.random.default_rng(0))
     operator.reset(env)
     while operator.phase != "carry":
         env.step(operator.act(env))
     # Drawn at twice the size and reduced: the renderer does not smooth edges.
-    renderer = WorksiteRenderer(env.worksite.machine, height=960, width=1280)
-    soil = env.worksite.soil
-    main_view, cab_view = renderer.render("main", soil), renderer.render("cab", soil)
-    region = target_mask_img(env.target, renderer.terrain_points_w(soil))[..., 0] > 0
+    renderer = WorksiteRenderer(env.worksite, height=960, width=1280)
+    main_view, cab_view = renderer.render("main"), renderer.render("cab")
+    region = env.target.contains(renderer.terrain_points_w())
     main_view[region] = (0.45 * main_view[region] + 0.55 * TINT_RGB).astype(np.uint8)
     renderer.close()
     path.parent.mkdir(parents=True, exist_ok=True)

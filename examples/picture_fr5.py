@@ -11,7 +11,7 @@ from PIL import Image
 
 from lerobot_excav.envs.machines.fr5.rendering import WorkcellRenderer
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
-from lerobot_excav.envs.tasks.grasp.operator import ScriptedOperator
+from lerobot_excav.envs.tasks.grasp.operator import GraspOperator
 
 TINT_RGB = np.array([0, 235, 235])
 LIFTED = 2.0  # reward of a lifted block
@@ -25,9 +25,9 @@ def main(path: Path, scene_id: int, target_id: int) -> None:
     env.workcell.model.vis.quality.numslices, env.workcell.model.vis.quality.numstacks = 64, 32
     renderer = WorkcellRenderer(env.workcell, height=960, width=1280)
     start = renderer.render("main")
-    block = renderer.block_masks()[target_id][..., 0] > 0
+    block = renderer.block_pixels()[target_id]
     start[block] = (0.35 * start[block] + 0.65 * TINT_RGB).astype(np.uint8)
-    operator = ScriptedOperator(rng=np.random.default_rng(0))
+    operator = GraspOperator(rng=np.random.default_rng(0))
     operator.reset(env)
     lifted = 0
     while lifted < 25:

@@ -3,11 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil import Soil
-
-Array = NDArray[np.float64]
+from validation import Array
 
 CLOSE_PACKING = math.pi / math.sqrt(18.0)
 """Solid fraction of the densest arrangement of equal spheres."""
@@ -17,15 +15,9 @@ _JITTER = 0.45
 
 
 def hexagonal_lattice(half_size_m: float, height_m: float, soil: Soil) -> tuple[Array, float]:
-    """Return a close-packed lattice stretched to the parcels' own packing, and the gap between neighbours.
+    """Return a close-packed lattice stretched to the parcels' own packing, and the gap between neighbours [m].
 
-    Args:
-        half_size_m: Points cover at least the square |x|, |y| <= this.
-        height_m: Layers lie between the radius of a parcel and this height.
-        soil: Gives radius and packing.
-
-    Returns:
-        (n, 3) points [m], lowest layer at z = radius, and the gap [m].
+    The (n, 3) points [m] cover at least the square |x|, |y| <= half_size_m, in layers from the radius of a parcel up.
     """
     stretch = (CLOSE_PACKING / soil.parameters.parcel_solid_fraction) ** (1.0 / 3.0)
     spacing = 2.0 * soil.parcel_radius_m * stretch
@@ -45,13 +37,8 @@ def hexagonal_lattice(half_size_m: float, height_m: float, soil: Soil) -> tuple[
 def cylinder(radius_m: float, height_m: float, soil: Soil, rng: np.random.Generator) -> Array:
     """Return the (n, 3) centres of parcels that fill a cylinder on the plane z = 0 about the z axis [m].
 
-    The lattice is turned and shifted at random and every parcel displaced a little, so that seeds differ.
-
-    Args:
-        radius_m: Radius of the cylinder, which the centres keep.
-        height_m: Its height, met to half a layer.
-        soil: Gives radius and packing of the parcels.
-        rng: Source of the arrangement.
+    The lattice is turned and shifted at random and every parcel displaced a little, so that seeds differ. The centres
+    keep the radius; the height is met to half a layer.
     """
     points, gap = hexagonal_lattice(radius_m + 4.0 * soil.parcel_radius_m, height_m, soil)
     angle = rng.uniform(0.0, 2.0 * math.pi)
@@ -62,5 +49,4 @@ def cylinder(radius_m: float, height_m: float, soil: Soil, rng: np.random.Genera
     shift = rng.normal(size=points.shape)
     shift *= (_JITTER * gap * rng.uniform(size=len(points)) / np.linalg.norm(shift, axis=1))[:, None]
     shift[:, 2] = np.abs(shift[:, 2])  # nobody starts inside the floor
-    moved: Array = points + shift
-    return moved
+    return points + shift

@@ -9,8 +9,9 @@ import numpy as np
 from lerobot_excav.envs.soil import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.forces import blade_force_n
 from validation.soil.column_laws import power_law
-from validation.soil.experiment import Conditions, SoilExperiment
-from validation.soil.results import Check, Plot, Result, Series, Table
+from validation.soil.experiment import Conditions, experiment
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 DEPTHS_M = (0.05, 0.10, 0.15)
 WIDTH_M = 0.33
@@ -46,6 +47,16 @@ def total_force_n(rake_deg: float, depth_m: float) -> float:
     return float(np.linalg.norm(blade_force_n(blade_sand(), depth_m, math.radians(rake_deg), WIDTH_M)))
 
 
+@experiment(
+    code="T5",
+    title="Force on a blade",
+    source="Hatamura and Chijiiwa 1977, as in Miedema, The Delft Sand, Clay and Rock Cutting Model, ch. 11 (their "
+    "measured forces are in figures; the gate is the bracket of three theories for their sand and blade)",
+    measures="A blade 0.33 m wide at a rake of 30° to 90°, 0.05 m to 0.15 m deep, in level sand of 38°, 26.6° on steel "
+    "and 1460 kg/m³.",
+    gate="in every cell from 0.8 times the least to 1.25 times the greatest theory; growing with depth, exponent "
+    "1.6 to 2.1; least near a rake of 35° to 45°",
+)
 def run(_: Conditions) -> Result:
     """Push the blade at every rake and depth; the conditions play no part."""
     forces = {rake: [total_force_n(rake, d) for d in DEPTHS_M] for rake in THEORIES_N}
@@ -90,16 +101,3 @@ def _plot(forces: dict[float, list[float]]) -> Plot:
         curves.append(Series(f"gate, {depth} m", rakes, low, y_high=high, color=k))
         curves.append(Series(f"this soil, {depth} m", rakes, found, color=k))
     return Plot("blade_force", "Force on a blade 0.33 m wide", "rake [°]", "force [N]", tuple(curves))
-
-
-EXPERIMENT = SoilExperiment(
-    code="T5",
-    title="Force on a blade",
-    source="Hatamura and Chijiiwa 1977, as in Miedema, The Delft Sand, Clay and Rock Cutting Model, ch. 11 (their "
-    "measured forces are in figures; the gate is the bracket of three theories for their sand and blade)",
-    measures="A blade 0.33 m wide at a rake of 30° to 90°, 0.05 m to 0.15 m deep, in level sand of 38°, 26.6° on steel "
-    "and 1460 kg/m³.",
-    gate="in every cell from 0.8 times the least to 1.25 times the greatest theory; growing with depth, exponent "
-    "1.6 to 2.1; least near a rake of 35° to 45°",
-    run=run,
-)

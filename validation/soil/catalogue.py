@@ -1,41 +1,19 @@
 """All experiments, in the order of the report."""
 
+from importlib import import_module
+
 from lerobot_excav.errors import require_choice
-from validation.soil import (
-    blade_force,
-    column_collapse,
-    determinism,
-    earthmoving_factors,
-    force_ramp,
-    free_fall,
-    heap,
-    ledger,
-    operator_cycle,
-    speed,
-    stall,
-)
 from validation.soil.experiment import SoilExperiment
 
-EXPERIMENTS: tuple[SoilExperiment, ...] = (
-    column_collapse.EXPERIMENT,
-    heap.EXPERIMENT,
-    blade_force.EXPERIMENT,
-    earthmoving_factors.EXPERIMENT,
-    operator_cycle.EXPERIMENT,
-    free_fall.EXPERIMENT,
-    ledger.EXPERIMENT,
-    determinism.EXPERIMENT,
-    speed.EXPERIMENT,
-    stall.EXPERIMENT,
-    force_ramp.EXPERIMENT,
+_FILES = (
+    *("column_collapse", "heap", "blade_force", "earthmoving_factors", "operator_cycle", "free_fall"),
+    *("ledger", "determinism", "speed", "stall", "force_ramp"),
 )
+EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 
 
 def chosen(codes: str | None) -> list[SoilExperiment]:
-    """Return experiments by their codes, in the order of the report.
-
-    Args:
-        codes: Codes separated by commas; None for all.
+    """Return experiments by their codes, which commas separate, in the order of the report; None for all.
 
     Raises:
         ConfigurationError: A code is unknown.

@@ -2,15 +2,15 @@
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters, relax
+from validation import Array
 from validation.soil.arrangement import cylinder
-from validation.soil.mass_radius import field_radius, mass_radius
+from validation.soil.resting import steps_until_rest
 
 MASS_SHARE = 0.99
 """Share of the mass within the run-out radius: single parcels roll on for ever."""
@@ -22,25 +22,15 @@ VOLUME_LIMIT_M3 = 0.60
 _TIME_LIMIT_S = 20.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Collapse:
-    """One collapse.
+class Collapse(NamedTuple):
+    """One collapse."""
 
-    Attributes:
-        aspect: Initial height over radius, from mass and radius.
-        run_out: (r - r0) / r0 of the mass radius.
-        height: Final height over initial radius.
-        stop_time: Time until the radius is within 2 % of its last value, over sqrt(h0 / g).
-        parcel_count: How many parcels there were.
-        cone_run_out: Run-out of the same column in a height field that only relaxes.
-    """
-
-    aspect: float
-    run_out: float
-    height: float
-    stop_time: float
-    parcel_count: int
-    cone_run_out: float
+    aspect: float  # initial height over radius, from mass and radius
+    run_out: float  # (r - r0) / r0 of the mass radius
+    height: float  # final height over initial radius
+    stop_time: float  # until the radius is within 2 % of its last value, over sqrt(h0 / g)
+    parcel_count: float
+    cone_run_out: float  # of the same column in a height field that only relaxes
 
 
 def sand_with_friction(friction_deg: float) -> SoilParameters:
@@ -52,20 +42,14 @@ def sand_with_friction(friction_deg: float) -> SoilParameters:
 
 
 def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: int) -> Collapse:
-    """Release a column on an empty floor and wait until everything rests.
-
-    Args:
-        parameters: The soil.
-        aspect: Height over radius to aim at; layers of parcels are whole.
-        fidelity: Numerical effort.
-        seed: Seed of the arrangement.
-    """
+    """Release a column on an empty floor and wait until everything rests; its aspect is met to a layer of parcels."""
     radius = min(RADIUS_M, (VOLUME_LIMIT_M3 / (math.pi * aspect)) ** (1.0 / 3.0))
     soil = Soil(parameters, (6.0, 6.0), 0.05, fidelity, seed)
     points = cylinder(radius, aspect * radius, soil, np.random.default_rng(seed))
     soil.add_parcels(points, np.zeros_like(points))
     height = len(points) * soil.parcel_mass_kg / (soil.density_kg_m3 * math.pi * radius**2)
-    radii = _radii_until_rest(soil)
+    steps = steps_until_rest(soil, dt_s=TICK_S, limit_s=_TIME_LIMIT_S)
+    radii = np.array([mass_radius(soil, MASS_SHARE) for _ in steps])
     moving = np.flatnonzero(np.abs(radii - radii[-1]) > 0.02 * radii[-1])
     stop = TICK_S * (moving[-1] + 2) if len(moving) else 0.0
     return Collapse(
@@ -78,25 +62,32 @@ def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: 
     )
 
 
-def _radii_until_rest(soil: Soil) -> NDArray[np.float64]:
-    """Step until the soil rests; return the mass radius after every tick."""
-    radii: list[float] = []
-    before = b""
-    while len(radii) < _TIME_LIMIT_S / TICK_S:
-        soil.step(TICK_S)
-        radii.append(mass_radius(soil, MASS_SHARE))
-        now = soil.heights_m.tobytes()
-        if now == before and len(soil.parcel_positions_w) == 0:
-            break
-        before = now
-    return np.array(radii)
-
-
 def _cone_radius(soil: Soil, radius_m: float, height_m: float) -> float:
     """Return the mass radius [m] of the same column after relaxation of a height field alone."""
-    x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
-    inside = np.hypot(x, y) <= radius_m
+    radii_m = np.hypot(*np.meshgrid(soil.x_w, soil.y_w, indexing="ij"))
+    inside = radii_m <= radius_m
     cell = float(soil.x_w[1] - soil.x_w[0])
     volume = math.pi * radius_m**2 * height_m
     rested = relax(inside * volume / (inside.sum() * cell**2), cell, soil.parameters.slope_tan)
-    return field_radius(rested, np.hypot(x, y), MASS_SHARE)
+    return share_radius(radii_m.ravel(), rested.ravel(), MASS_SHARE)
+
+
+def share_radius(radii_m: Array, masses_kg: Array, share: float) -> float:
+    """Return the radius [m] that holds a share in (0, 1) of (n,) masses, linear between the sorted (n,) radii."""
+    order = np.argsort(radii_m)
+    reached = np.cumsum(masses_kg[order])
+    return float(np.interp(share * reached[-1], reached, radii_m[order]))
+
+
+def mass_radius(soil: Soil, share: float) -> float:
+    """Return the radius [m] about the z axis that holds a share of the soil on the ground and in parcels."""
+    x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
+    heights = soil.heights_m
+    total = float(heights.sum())
+    cell_kg = soil.ledger_kg()["grid"] / total if total > 0.0 else 0.0
+    parcels = soil.parcel_positions_w
+    return share_radius(
+        np.concatenate([np.hypot(x, y).ravel(), np.hypot(parcels[:, 0], parcels[:, 1])]),
+        np.concatenate([heights.ravel() * cell_kg, soil.parcel_masses_kg]),
+        share,
+    )

@@ -4,10 +4,10 @@ import hashlib
 
 import numpy as np
 
-from bench.soil import cone
+from bench.soil import cone, pile
 from lerobot_excav.envs.soil import Soil
-from validation.soil.dig_runs import cases, dig, prepared_soil
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.dig_runs import cases, dig
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
 
 
@@ -21,18 +21,26 @@ def trace(soil: Soil, *, quick: bool) -> str:
     return digest.hexdigest()[:16]
 
 
+@experiment(
+    code="T13",
+    title="Determinism",
+    source="Repeatability of an experiment",
+    measures="A dig cycle, the same again after a reset, and the same in another soil object, for every soil and "
+    "fidelity.",
+    gate="bit-equal traces; a reset gives the heights back byte for byte",
+)
 def run(conditions: Conditions) -> Result:
     """Dig the same cycle in two soils and once more after a reset, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
     different = unequal = 0
     for preset, fidelity in track(cases(conditions), "T13 repeats"):
-        soil = prepared_soil(preset, fidelity, conditions.seeds[0])
+        soil = pile(preset, fidelity, conditions.seeds[0])
         first = trace(soil, quick=conditions.quick)
         heights = cone(soil)
         soil.reset(heights)
         unequal += soil.heights_m.tobytes() != heights.tobytes()
         again = trace(soil, quick=conditions.quick)
-        other = trace(prepared_soil(preset, fidelity, conditions.seeds[0]), quick=conditions.quick)
+        other = trace(pile(preset, fidelity, conditions.seeds[0]), quick=conditions.quick)
         different += (again != first) + (other != first)
         rows.append((preset, fidelity, first, again, other))
     return Result(
@@ -46,14 +54,3 @@ def run(conditions: Conditions) -> Result:
             "version of the code and to one kind of processor.",
         ),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T13",
-    title="Determinism",
-    source="Repeatability of an experiment",
-    measures="A dig cycle, the same again after a reset, and the same in another soil object, for every soil and "
-    "fidelity.",
-    gate="bit-equal traces; a reset gives the heights back byte for byte",
-    run=run,
-)

@@ -5,8 +5,9 @@ import math
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from validation.soil.blade_force import DEPTHS_M, THEORIES_N, WIDTH_M, blade_sand
-from validation.soil.experiment import Conditions, SoilExperiment
-from validation.soil.results import Check, Plot, Result, Series, Table
+from validation.soil.experiment import Conditions, experiment
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 FRICTION_DEG, STEEL_DEG = 39.0, 26.0
 
@@ -31,6 +32,14 @@ def blade_force_n(rake_deg: float, depth_m: float, *, density: float, width_m: f
     return density * GRAVITY_M_S2 * depth_m**2 * weight * width_m
 
 
+@experiment(
+    code="T6",
+    title="Factors of earthmoving",
+    source="Reece 1965, McKyes 1985: the fundamental equation of earthmoving; dry sand of Hatamura and Chijiiwa 1977",
+    measures="Factors at 39°/26° for rakes of 20° to 90°, forces on a blade 0.33 m wide in sand of 38°/26.6°, and how "
+    "they scale.",
+    gate="1 % of the tables; without cohesion exactly proportional to density, width and depth²",
+)
 def run(_: Conditions) -> Result:
     """Compare factors, forces and scaling with the tables; the conditions play no part."""
     factor_rows, factor_error = _factors()
@@ -109,14 +118,3 @@ def _curves(rakes: tuple[float, ...], rows: tuple[tuple[float, ...], ...]) -> li
         curves.append(Series(name, rakes, found, style="line", color=k))
         curves.append(Series(f"{name}, tabulated", rakes, published, color=k))
     return curves
-
-
-EXPERIMENT = SoilExperiment(
-    code="T6",
-    title="Factors of earthmoving",
-    source="Reece 1965, McKyes 1985: the fundamental equation of earthmoving; dry sand of Hatamura and Chijiiwa 1977",
-    measures="Factors at 39°/26° for rakes of 20° to 90°, forces on a blade 0.33 m wide in sand of 38°/26.6°, and how "
-    "they scale.",
-    gate="1 % of the tables; without cohesion exactly proportional to density, width and depth²",
-    run=run,
-)

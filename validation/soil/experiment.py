@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from tqdm import tqdm
 
@@ -12,20 +13,13 @@ from validation.soil.results import Check, Result
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """Under which conditions the experiments run.
+    """Under which conditions the experiments run."""
 
-    Attributes:
-        preset: Name of the soil. Experiments that compare soils, or that were made with one sand, say so and do not
-            follow it.
-        fidelity: Numerical effort.
-        seeds: Each repeats the random parts: arrangement of parcels, their jitter.
-        quick: Whether to leave out repetitions and to coarsen series; gates stay as they are.
-    """
-
+    # Experiments that compare soils, or that were made with one sand, say so and do not follow the preset.
     preset: str = "sand"
     fidelity: str = "standard"
-    seeds: tuple[int, ...] = (0, 1, 2)
-    quick: bool = False
+    seeds: tuple[int, ...] = (0, 1, 2)  # each repeats the random parts: arrangement of parcels, their jitter
+    quick: bool = False  # leaves out repetitions and coarsens series; gates stay as they are
 
     def __post_init__(self) -> None:
         require_choice("--soil", self.preset, PRESETS)
@@ -33,34 +27,39 @@ class Conditions:
         require(len(self.seeds) >= 1, "--seeds is empty; give at least one, as in --seeds=0")
         require(min(self.seeds) >= 0, f"--seeds={self.seeds}; allowed: 0 and above")
 
+    @property
+    def repeats(self) -> tuple[int, ...]:
+        """The seeds with which an experiment is repeated."""
+        return self.seeds[:1] if self.quick else self.seeds
+
 
 @dataclass(frozen=True, kw_only=True)
 class SoilExperiment:
-    """One experiment.
+    """One experiment: how it is run, and in words where its numbers come from, what it measures and its gate."""
 
-    Attributes:
-        code: Short name, as in `--only`.
-        title: What it is.
-        source: Where its numbers come from.
-        measures: What is done and measured.
-        gate: The gate in words.
-        run: Runs it.
-        reasons: Why a check may miss, by the start of its name.
-        is_timed: Whether its values depend on the machine; they then decide nothing but are reported.
-    """
-
-    code: str
+    run: Callable[[Conditions], Result]
+    code: str  # as in `--only`
     title: str
     source: str
     measures: str
     gate: str
-    run: Callable[[Conditions], Result]
-    reasons: dict[str, str] = field(default_factory=dict)
-    is_timed: bool = False
+    reasons: dict[str, str] = field(default_factory=dict)  # why a check may miss, by the start of its name
+    is_timed: bool = False  # its values depend on the machine: they are reported but decide nothing
+
+    @property
+    def anchor(self) -> str:
+        """Where a link to its section of the report leads, as Markdown names it."""
+        title = f"{self.code} {self.title}".lower().replace(" ", "-")
+        return "".join(c for c in title if c.isalnum() or c == "-")
 
     def reason(self, check: Check) -> str:
         """Return why a check may miss; empty if nobody has found out."""
         return next((text for start, text in self.reasons.items() if check.name.startswith(start)), "")
+
+
+def experiment(**words: Any) -> Callable[[Callable[[Conditions], Result]], SoilExperiment]:
+    """Make an experiment of a function; the words are the other fields of `SoilExperiment`."""
+    return lambda run: SoilExperiment(run=run, **words)
 
 
 def track[Item](items: Iterable[Item], label: str) -> Iterator[Item]:

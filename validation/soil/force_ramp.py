@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
-from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
-
-Array = NDArray[np.float64]
+from validation import Array
+from validation.soil.experiment import Conditions, experiment, track
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 RAKES_DEG = (25.0, 35.0, 45.0)
 GROUND_M = 1.0
@@ -27,12 +26,9 @@ _DRAG_W = np.array([-SPEED_M_S, 0.0, 0.0])
 
 
 def force_at_n(soil: Soil, depth_m: float, rake_deg: float) -> float:
-    """Return the force on the bucket in fresh, level ground [N], dragged level with its bottom plate at a rake.
+    """Return the force on the bucket [N], dragged level with its bottom plate at a rake, in ground that is reset.
 
-    Args:
-        soil: Any soil; it is reset.
-        depth_m: Depth of the cutting edge, negative above the ground.
-        rake_deg: Angle of the bottom plate to the ground.
+    The depth is that of the cutting edge, negative above the ground.
     """
     first, second = BUCKET.profile_t[0], BUCKET.profile_t[1]
     plate = math.atan2(second[1] - first[1], second[0] - first[0])
@@ -43,6 +39,13 @@ def force_at_n(soil: Soil, depth_m: float, rake_deg: float) -> float:
     return float(np.linalg.norm(reaction.force_w_n))
 
 
+@experiment(
+    code="T16",
+    title="Force against digging depth",
+    source="Earthmoving and bearing theory; depth ramp of AGX Terrain",
+    measures="A bucket 0.72 m wide is dragged through fresh, level ground, from 5 cm above it to 0.4 m below.",
+    gate="no force above the surface, continuous at contact and below it",
+)
 def run(conditions: Conditions) -> Result:
     """Measure the force at every depth from above the ground to 0.4 m."""
     spacing = QUICK_SPACING_M if conditions.quick else SPACING_M
@@ -74,20 +77,5 @@ def _table(soil: Soil) -> Table:
 
 def _plot(depths: Array, forces: dict[float, Array]) -> Plot:
     curves = (Series(f"rake {rake:.0f}°", depths, force, style="line") for rake, force in forces.items())
-    return Plot(
-        "force_ramp",
-        "Force on a bucket that is dragged level",
-        "depth of the cutting edge [m]",
-        "force [N]",
-        tuple(curves),
-    )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T16",
-    title="Force against digging depth",
-    source="Earthmoving and bearing theory; depth ramp of AGX Terrain",
-    measures="A bucket 0.72 m wide is dragged through fresh, level ground, from 5 cm above it to 0.4 m below.",
-    gate="no force above the surface, continuous at contact and below it",
-    run=run,
-)
+    title, x_label = "Force on a bucket that is dragged level", "depth of the cutting edge [m]"
+    return Plot("force_ramp", title, x_label, "force [N]", tuple(curves))

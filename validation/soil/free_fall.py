@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import Soil
+from validation import Array
 from validation.soil.arrangement import cylinder
-from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
-
-Array = NDArray[np.float64]
+from validation.soil.experiment import Conditions, experiment, track
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 HEIGHTS_M = (0.25, 0.5, 1.0, 2.0)
 
@@ -69,10 +68,10 @@ def mechanical_energy_j(soil: Soil) -> float:
 
 
 def drift_in_the_air_m(*, preset: str, fidelity: str, seed: int) -> tuple[float, float]:
-    """Let a contracting cloud fall until just before it lands.
+    """Let a contracting cloud fall until just before it lands; measure the path of its centre of mass.
 
     Returns:
-        Horizontal drift of the centre of mass, and its vertical distance from the parabola, both [m].
+        Horizontal drift, and vertical distance from the parabola, both [m].
     """
     soil = Soil(preset, (4.0, 4.0), 0.05, fidelity, seed)
     cloud(soil, np.random.default_rng(seed), height_m=CLOUD_HEIGHT_M)
@@ -97,15 +96,26 @@ def energies_of_a_dump_j(*, preset: str, fidelity: str, seed: int) -> Array:
     return np.array(energies)
 
 
+@experiment(
+    code="T11",
+    title="Free fall and dump",
+    source="Mechanics: t = √(2h/g); the centre of mass of a cloud is moved by gravity only; friction takes energy",
+    measures="Single parcels fall from 0.25 m to 2 m. A contracting cloud of parcels collides with itself in the air "
+    "2 m above the ground. Another is dropped from 1 m, lands, spreads and rests.",
+    gate="fall time (1 %, our own tolerance); drift of the centre of mass 0; energy never grows",
+    reasons={
+        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step "
+        "and give part of it back in the next; kinetic and potential energy leave out what they hold meanwhile. "
+        "Their sum never rises above its start."
+    },
+)
 def run(conditions: Conditions) -> Result:
     """Drop single parcels and clouds."""
     common = {"preset": conditions.preset, "fidelity": conditions.fidelity}
     times = [(h, fall_time_s(h, **common), math.sqrt(2.0 * h / GRAVITY_M_S2)) for h in HEIGHTS_M]
-    seeds = conditions.seeds[:1] if conditions.quick else conditions.seeds
-    drifts, dumps = [], []
-    for seed in track(seeds, "T11 clouds"):
-        drifts.append(drift_in_the_air_m(**common, seed=seed))
-        dumps.append(energies_of_a_dump_j(**common, seed=seed))
+    seeds = conditions.repeats
+    drifts = [drift_in_the_air_m(**common, seed=seed) for seed in track(seeds, "T11 clouds in the air")]
+    dumps = [energies_of_a_dump_j(**common, seed=seed) for seed in track(seeds, "T11 dumps")]
     drift = max(horizontal for horizontal, _ in drifts)
     time_error = max(abs(found / law - 1.0) for _, found, law in times)
     growth = max(float(np.diff(energies).max()) / float(energies[0]) for energies in dumps)
@@ -130,26 +140,5 @@ def run(conditions: Conditions) -> Result:
 
 def _plot(energies: Array) -> Plot:
     times = TICK_S * np.arange(len(energies))
-    return Plot(
-        "dump_energy",
-        "Energy of a dump",
-        "time [s]",
-        "kinetic and potential energy [J]",
-        (Series("parcels and grid", times, energies, style="line"),),
-    )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T11",
-    title="Free fall and dump",
-    source="Mechanics: t = √(2h/g); the centre of mass of a cloud is moved by gravity only; friction takes energy",
-    measures="Single parcels fall from 0.25 m to 2 m. A contracting cloud of parcels collides with itself in the air "
-    "2 m above the ground. Another is dropped from 1 m, lands, spreads and rests.",
-    gate="fall time (1 %, our own tolerance); drift of the centre of mass 0; energy never grows",
-    run=run,
-    reasons={
-        "growth of the energy in a step": "Contacts are springs. When a cloud lands they take up energy in one step "
-        "and give part of it back in the next; kinetic and potential energy leave out what they hold meanwhile. "
-        "Their sum never rises above its start."
-    },
-)
+    curve = Series("parcels and grid", times, energies, "line")
+    return Plot("dump_energy", "Energy of a dump", "time [s]", "kinetic and potential energy [J]", (curve,))

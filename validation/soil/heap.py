@@ -1,17 +1,18 @@
 """T3: soil poured on a plane makes a cone at its angle of repose."""
 
 import math
-from dataclasses import dataclass
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil
-from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
-
-Array = NDArray[np.float64]
+from validation import Array
+from validation.soil.experiment import Conditions, experiment, track
+from validation.soil.plots import Plot, Series
+from validation.soil.resting import steps_until_rest
+from validation.soil.results import Check, Result, Table
 
 MASS_KG = 485.0
 """A bucket of sand."""
@@ -31,41 +32,22 @@ LAYER_S = 0.1
 _TIME_LIMIT_S = 60.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Heap:
-    """A heap at rest.
-
-    Attributes:
-        preset: Name of the soil.
-        repose_deg: Its friction angle.
-        angles_deg: (8,) slope of the flank by azimuth.
-        height_m: Greatest height.
-        cone_height_m: Height of the ideal cone of the same mass and angle.
-        mass_error: Mass on the ground over the mass poured, minus 1.
-        profile_m: (2, n) radius and mean height over the azimuths.
-    """
+class Heap(NamedTuple):
+    """A heap at rest."""
 
     preset: str
-    repose_deg: float
-    angles_deg: Array
+    repose_deg: float  # friction angle of the soil
+    angles_deg: Array  # (8,) slope of the flank by azimuth
     height_m: float
-    cone_height_m: float
-    mass_error: float
-    profile_m: Array
+    cone_height_m: float  # of the ideal cone of the same mass and angle
+    mass_error: float  # mass on the ground over the mass poured, minus 1
+    profile_m: Array  # (2, n) radius and mean height over the azimuths
 
 
-def pour_heap(preset: str, *, fidelity: str, seed: int, dt_s: float, mass_kg: float = MASS_KG) -> Heap:
-    """Pour soil from a funnel that stands still, and wait until everything rests.
-
-    Args:
-        preset: Name of the soil.
-        fidelity: Numerical effort.
-        seed: Seed of the funnel's jitter.
-        dt_s: Time step.
-        mass_kg: Mass to pour, to the nearest whole parcel.
-    """
+def pour_heap(preset: str, *, fidelity: str, seed: int, dt_s: float) -> Heap:
+    """Pour whole parcels from a funnel that stands still, and wait until everything rests; the seed turns them."""
     soil = Soil(preset, (4.0, 4.0), 0.05, fidelity, seed)
-    count = round(mass_kg / soil.parcel_mass_kg)
+    count = round(MASS_KG / soil.parcel_mass_kg)
     poured, parameters = count * soil.parcel_mass_kg, PRESETS[preset]
     volume = poured / parameters.density_kg_m3
     height = (3.0 * volume * parameters.slope_tan**2 / math.pi) ** (1.0 / 3.0)
@@ -84,19 +66,12 @@ def pour_heap(preset: str, *, fidelity: str, seed: int, dt_s: float, mass_kg: fl
 
 def _pour(soil: Soil, count: int, mouth_m: float, rng: np.random.Generator, dt_s: float) -> None:
     """Pour parcels and let them come to rest."""
-    every, tick = round(LAYER_S / dt_s), 0
-    left, before = count, b""
-    while tick * dt_s < _TIME_LIMIT_S:
-        if left > 0 and tick % every == 0:
+    every, left = round(LAYER_S / dt_s), count
+    for number in chain([0], steps_until_rest(soil, dt_s=dt_s, limit_s=_TIME_LIMIT_S)):
+        if left > 0 and number % every == 0:
             points = _layer(soil.parcel_radius_m, mouth_m, rng)[:left]
             soil.add_parcels(points, np.tile([0.0, 0.0, -NOZZLE_SPEED_M_S], (len(points), 1)))
             left -= len(points)
-        soil.step(dt_s)
-        tick += 1
-        now = soil.heights_m.tobytes()
-        if left == 0 and now == before and len(soil.parcel_positions_w) == 0:
-            break
-        before = now
 
 
 def _layer(radius_m: float, mouth_m: float, rng: np.random.Generator) -> Array:
@@ -124,9 +99,25 @@ def _profile(soil: Soil, reach_m: float) -> Array:
     return np.stack([radii, soil.height_at(directions[:, None] * radii[:, None]).mean(axis=0)])
 
 
+SLOPE_OF_PARCELS = (
+    "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the height "
+    "field only take what is steeper than the preset's angle; they cannot steepen a flank."
+)
+
+
+@experiment(
+    code="T3",
+    title="Heap and repose",
+    source="The cone of a volume V: h = (3 V tan² θ / π)^(1/3); repose angle of the preset, as AGX Terrain takes it",
+    measures="485 kg leave a funnel whose mouth stands still 0.15 m above the top of the ideal cone. Straight lines "
+    "through the flank between a quarter and three quarters of the cone's radius in 8 sectors, each the mean of the "
+    "pours with different seeds; every soil.",
+    gate="the preset's angle ± 2° in 8 azimuths; mass error below 1e-9",
+    reasons=dict.fromkeys(("gentlest flank", "steepest flank"), SLOPE_OF_PARCELS),
+)
 def run(conditions: Conditions) -> Result:
     """Pour a heap of every soil; of sand also with half the time step."""
-    seeds = conditions.seeds[:1] if conditions.quick else conditions.seeds
+    seeds = conditions.repeats
     cases = [(preset, TICK_S) for preset in ((conditions.preset,) if conditions.quick else PRESETS)]
     if not conditions.quick:
         cases.append(("sand", 0.5 * TICK_S))
@@ -168,31 +159,7 @@ def _plot(heaps: list[Heap]) -> Plot:
     for k, heap in enumerate(heaps):
         radii, heights = heap.profile_m
         cone = np.maximum(0.0, heap.cone_height_m - math.tan(math.radians(heap.repose_deg)) * radii)
-        curves.append(Series(heap.preset, radii, heights, style="line", color=k))
-        label = f"cone at {heap.repose_deg:.0f}°"
-        curves.append(Series(label, radii, cone, style="dashed", color=k))
-    return Plot(
-        "heap",
-        "A heap of 485 kg, mean of 8 azimuths",
-        "distance from the axis [m]",
-        "height [m]",
-        tuple(curves),
-    )
-
-
-SLOPE_OF_PARCELS = (
-    "Loose parcels come to rest on their own slope, which is that of rolling spheres. The avalanches of the height "
-    "field only take what is steeper than the preset's angle; they cannot steepen a flank."
-)
-
-EXPERIMENT = SoilExperiment(
-    code="T3",
-    title="Heap and repose",
-    source="The cone of a volume V: h = (3 V tan² θ / π)^(1/3); repose angle of the preset, as AGX Terrain takes it",
-    measures="485 kg leave a funnel whose mouth stands still 0.15 m above the top of the ideal cone. Straight lines "
-    "through the flank between a quarter and three quarters of the cone's radius in 8 sectors, each the mean of the "
-    "pours with different seeds; every soil.",
-    gate="the preset's angle ± 2° in 8 azimuths; mass error below 1e-9",
-    run=run,
-    reasons=dict.fromkeys(("gentlest flank", "steepest flank"), SLOPE_OF_PARCELS),
-)
+        curves.append(Series(heap.preset, radii, heights, "line", color=k))
+        curves.append(Series(f"cone at {heap.repose_deg:.0f}°", radii, cone, "dashed", color=k))
+    title = "A heap of 485 kg, mean of 8 azimuths"
+    return Plot("heap", title, "distance from the axis [m]", "height [m]", tuple(curves))

@@ -2,19 +2,28 @@
 
 import math
 
-from validation.soil.dig_runs import cases, dig, prepared_soil
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from bench.soil import pile
+from validation.soil.dig_runs import cases, dig
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
 
 TOLERANCE_KG = 1e-6
 
 
+@experiment(
+    code="T12",
+    title="Mass ledger",
+    source="Conservation of mass",
+    measures="Grid, parcels, bucket, box and out of bounds are added up after every step of a dig cycle with a dump "
+    "into the box, for every soil and fidelity.",
+    gate="the sum is constant to 1e-6 kg in every step; no entry and no height is ever negative",
+)
 def run(conditions: Conditions) -> Result:
     """Add the ledger up after every step of a dig cycle, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
     worst, lowest, least = 0.0, math.inf, math.inf
     for preset, fidelity in track(cases(conditions), "T12 ledgers"):
-        soil = prepared_soil(preset, fidelity, conditions.seeds[0])
+        soil = pile(preset, fidelity, conditions.seeds[0])
         total, error = sum(soil.ledger_kg().values()), 0.0
         for _ in dig(soil, quick=conditions.quick):
             entries = soil.ledger_kg().values()
@@ -32,14 +41,3 @@ def run(conditions: Conditions) -> Result:
         ),
         tables=(Table(header, tuple(rows)),),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T12",
-    title="Mass ledger",
-    source="Conservation of mass",
-    measures="Grid, parcels, bucket, box and out of bounds are added up after every step of a dig cycle with a dump "
-    "into the box, for every soil and fidelity.",
-    gate="the sum is constant to 1e-6 kg in every step; no entry and no height is ever negative",
-    run=run,
-)

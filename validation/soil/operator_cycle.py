@@ -4,7 +4,7 @@ import numpy as np
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.simulation import play_demonstration
-from validation.soil.experiment import Conditions, SoilExperiment, track
+from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
 
 RETAINED_KG = (420.0, 550.0)
@@ -13,14 +13,16 @@ RETAINED_KG = (420.0, 550.0)
 SCENES, QUICK_SCENES = 8, 2
 
 
+@experiment(
+    code="T8",
+    title="An operator's cycle",
+    source="Retained mass of a person's cycles in AGX Terrain, sand at 1474 kg/m³ and 39°: 485 ± 65 kg",
+    measures="The scripted operator digs, lifts, swings and dumps once per scene; the mass in the box at the end.",
+    gate="mean 485 ± 65 kg",
+)
 def run(conditions: Conditions) -> Result:
     """Let the scripted operator play validation scenes without pictures."""
-    env = {
-        "scene_set": "val",
-        "soil": conditions.preset,
-        "fidelity": conditions.fidelity,
-        "episode_length": 200,
-    }
+    env = {"scene_set": "val", "soil": conditions.preset, "fidelity": conditions.fidelity, "episode_length": 200}
     settings = DemonstrationSettings.of(
         "excavator", env, scenes=QUICK_SCENES if conditions.quick else SCENES, targets=1
     )
@@ -38,13 +40,3 @@ def run(conditions: Conditions) -> Result:
         tables=(Table(("scene", "target", "retained [kg]", "left in the bucket [kg]", "success"), tuple(rows)),),
         remarks=(f"{len(rows)} scenes of the set `val`; spread {np.std(masses):.0f} kg (one standard deviation).",),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T8",
-    title="An operator's cycle",
-    source="Retained mass of a person's cycles in AGX Terrain, sand at 1474 kg/m³ and 39°: 485 ± 65 kg",
-    measures="The scripted operator digs, lifts, swings and dumps once per scene; the mass in the box at the end.",
-    gate="mean 485 ± 65 kg",
-    run=run,
-)

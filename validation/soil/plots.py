@@ -1,12 +1,9 @@
-"""Plots of the report as small pictures."""
+"""Plots of the report: what they show, and small pictures of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, NamedTuple
 
-from validation.soil.results import Plot, Series
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
 SIZE_IN = (6.0, 4.0)
 DPI = 110
@@ -18,13 +15,33 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def draw(plot: Plot, path: Path) -> None:
-    """Draw a plot into a PNG file.
+class Series(NamedTuple):
+    """One series of values: points, a curve, or a band between `y` and `y_high`.
 
-    Args:
-        plot: What to draw.
-        path: File to write; its folder exists.
+    Series of one `color` look alike, such as theory and measurement of one thing; None takes the next colour.
     """
+
+    label: str
+    x: ArrayLike
+    y: ArrayLike
+    style: Literal["line", "dashed", "points"] = "points"
+    y_high: ArrayLike | None = None
+    color: int | None = None
+
+
+class Plot(NamedTuple):
+    """One picture of the report; `name` is that of its file, without ending."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Series, ...]
+    logarithmic: bool = False
+
+
+def draw(plot: Plot, path: Path) -> None:
+    """Draw a plot into a PNG file, whose folder exists."""
     # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
     from matplotlib.figure import Figure
     from matplotlib.ticker import StrMethodFormatter
@@ -32,25 +49,20 @@ def draw(plot: Plot, path: Path) -> None:
     figure = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
     axes = figure.subplots()
     for number, curve in enumerate(plot.curves):
-        _draw_curve(axes, curve, f"C{number if curve.color is None else curve.color}")
+        look: dict[str, Any] = {"color": f"C{number if curve.color is None else curve.color}", "label": curve.label}
+        if curve.y_high is None:
+            axes.plot(curve.x, curve.y, **look, **_STYLES[curve.style])
+        else:
+            axes.fill_between(curve.x, curve.y, curve.y_high, alpha=0.18, linewidth=0, **look)
     if plot.logarithmic:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axis.set_minor_formatter(StrMethodFormatter("{x:g}"))
         axes.tick_params(which="both", labelsize=8)
     axes.set_title(plot.title, fontsize=11)
-    axes.set_xlabel(plot.x_label)
-    axes.set_ylabel(plot.y_label)
+    axes.set(xlabel=plot.x_label, ylabel=plot.y_label)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     # No version in the file: a plot that did not change does not change its file either.
     figure.savefig(path, metadata={"Software": None})
-
-
-def _draw_curve(axes: "Axes", curve: Series, color: str) -> None:
-    if curve.y_high is not None:
-        axes.fill_between(curve.x, curve.y, curve.y_high, color=color, alpha=0.18, linewidth=0, label=curve.label)
-        return
-    axes.plot(curve.x, curve.y, color=color, label=curve.label, **_STYLES[curve.style])

@@ -1,25 +1,15 @@
-"""What an experiment found: gated values, a table, plots."""
+"""What an experiment found: gated values, tables, plots."""
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
-from numpy.typing import ArrayLike
-
-Style = Literal["line", "dashed", "points"]
+from validation.soil.plots import Plot
 
 
 @dataclass(frozen=True)
 class Check:
-    """One measured value and its gate.
-
-    Attributes:
-        name: What was measured.
-        value: The value.
-        unit: Its unit, empty for a pure number.
-        low: Smallest allowed value.
-        high: Largest allowed value.
-    """
+    """One measured value and its gate from `low` to `high`; `unit` is empty for a pure number."""
 
     name: str
     value: float
@@ -40,82 +30,38 @@ class Check:
         return max(self.low - self.value, self.value - self.high, 0.0)
 
     @property
+    def value_text(self) -> str:
+        """The value with its unit."""
+        return f"{number_text(self.value)} {self.unit}".rstrip()
+
+    @property
+    def missed_text(self) -> str:
+        """The distance to the gate with its unit."""
+        return f"{number_text(self.missed_by)} {self.unit}".rstrip()
+
+    @property
     def gate_text(self) -> str:
-        """The gate in words."""
+        """The gate in words, with its unit."""
+        low, high = number_text(self.low), number_text(self.high)
         if self.low == self.high:
-            return f"= {number_text(self.low)}"
-        if math.isinf(self.low):
-            return f"≤ {number_text(self.high)}"
-        if math.isinf(self.high):
-            return f"≥ {number_text(self.low)}"
-        return f"{number_text(self.low)} to {number_text(self.high)}"
+            words = f"= {low}"
+        elif math.isinf(self.low):
+            words = f"≤ {high}"
+        else:
+            words = f"≥ {low}" if math.isinf(self.high) else f"{low} to {high}"
+        return f"{words} {self.unit}".rstrip()
 
 
-@dataclass(frozen=True)
-class Table:
-    """Values without a gate.
-
-    Attributes:
-        header: Column names, units included.
-        rows: Cells; numbers are rounded when shown.
-    """
+class Table(NamedTuple):
+    """Values without a gate; the header has the units, and numbers are rounded when shown."""
 
     header: tuple[str, ...]
     rows: tuple[tuple[float | str, ...], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Series:
-    """One series of values of a plot.
-
-    Attributes:
-        label: Its entry in the legend.
-        x: Abscissae.
-        y: Ordinates.
-        style: How it is drawn.
-        y_high: Upper end of a band that starts at `y`; None for points and curves.
-        color: Index of its colour, so that theory and measurement of one thing look alike; None for the next one.
-    """
-
-    label: str
-    x: ArrayLike
-    y: ArrayLike
-    style: Style = "points"
-    y_high: ArrayLike | None = None
-    color: int | None = None
-
-
-@dataclass(frozen=True)
-class Plot:
-    """One picture of the report.
-
-    Attributes:
-        name: Name of its file, without ending.
-        title: What it shows.
-        x_label: Abscissa with its unit.
-        y_label: Ordinate with its unit.
-        curves: What is drawn.
-        logarithmic: Whether both axes are logarithmic.
-    """
-
-    name: str
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Series, ...]
-    logarithmic: bool = False
-
-
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Outcome of an experiment.
-
-    Attributes:
-        checks: Gated values.
-        tables: Values without a gate.
-        plots: Pictures.
-        remarks: Sentences that only the run can tell, such as how many parcels there were.
-    """
+    """Outcome of an experiment; `remarks` are what only the run can tell, such as how many parcels there were."""
 
     checks: tuple[Check, ...]
     tables: tuple[Table, ...] = ()
@@ -123,34 +69,23 @@ class Result:
     remarks: tuple[str, ...] = ()
 
     @property
-    def passed(self) -> bool:
-        """Whether every value is inside its gate."""
-        return all(check.passed for check in self.checks)
-
-    @property
     def missed(self) -> tuple[Check, ...]:
         """The values outside of their gates."""
         return tuple(check for check in self.checks if not check.passed)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return checks and tables as plain values; an open end of a gate is None."""
-        checks = []
-        for check in self.checks:
-            fields = {key: _finite(value) for key, value in asdict(check).items()}
-            checks.append({**fields, "passed": check.passed, "missed_by": _finite(check.missed_by)})
-        return {"passed": self.passed, "checks": checks, "tables": [asdict(table) for table in self.tables]}
+        """Return checks and tables as plain values."""
+        checks = [{**asdict(c), "passed": c.passed, "missed_by": c.missed_by} for c in self.checks]
+        return {"passed": not self.missed, "checks": checks, "tables": [table._asdict() for table in self.tables]}
 
 
-def number_text(value: float) -> str:
-    """Return a number with three significant digits, plain from 0.001 to 100,000."""
+def number_text(value: float | str) -> str:
+    """Return a number with three significant digits, plain from 0.001 to 100,000; words as they are."""
+    if isinstance(value, str):
+        return value
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}"
-    if 1e-3 <= abs(value) < 1e5:
-        digits = max(0, 2 - math.floor(math.log10(abs(value))))
-        text = f"{value:.{digits}f}"
-        return text.rstrip("0").rstrip(".") if "." in text else text
-    return f"{value:.2g}"
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    if not 1e-3 <= abs(value) < 1e5:
+        return f"{value:.2g}"
+    text = f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text

@@ -1,20 +1,16 @@
 """How the time of a step grows with the number of awake parcels and with the number of cells."""
 
 import math
-from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.soil import cone, dig_cycle, timed_steps
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
+from bench.soil import dig_cycle, pile, quickest_steps
 from lerobot_excav.envs.soil import FIDELITIES, Soil
 from validation.soil.arrangement import cylinder
 from validation.soil.experiment import Conditions
-from validation.soil.results import Plot, Series
-
-Array = NDArray[np.float64]
+from validation.soil.plots import Plot, Series
 
 _EXTENT_M = 6.0
 _SLENDERNESS = 2.5
@@ -26,94 +22,63 @@ _TICKS = slice(2, 16)
 _COUNTS = (100, 250, 500, 750, 1000, 1500, 2000)
 _CELLS = (40, 60, 80, 120, 160, 240)
 _REPEATS = 3
-"""A step computes the same every time; the quickest of several runs is the one that nothing else disturbed."""
 
 
 class StepTime(NamedTuple):
-    """Time of one step under one load.
-
-    Attributes:
-        size: Awake parcels, or cells along one side of the dig area.
-        mean_ms: Mean computing time.
-        p95_ms: 95 % of the steps take less.
-    """
+    """Mean time of a step [ms] under one load: awake parcels, or cells along one side of the dig area."""
 
     size: float
     mean_ms: float
-    p95_ms: float
 
 
-def parcel_scaling(preset: str, fidelity: str, seed: int, *, quick: bool = False) -> list[StepTime]:
-    """Time steps with more and more parcels that fall apart as a column, up to the fidelity's bound.
+def add_column(soil: Soil, count: int, radius_m: float, height_m: float, seed: int) -> Soil:
+    """Add the lowest parcels of a cylinder to an empty soil, and return it: they fall apart at once."""
+    points = cylinder(radius_m, height_m, soil, np.random.default_rng(seed))
+    lowest = points[np.argsort(points[:, 2], kind="stable")][:count]
+    soil.add_parcels(lowest, np.zeros_like(lowest))
+    return soil
 
-    Args:
-        preset: Soil.
-        fidelity: Numerical effort.
-        seed: Seed of their arrangement.
-        quick: Whether to take fewer sizes, once each.
-    """
-    counts = [count for count in _COUNTS if count <= FIDELITIES[fidelity].most_awake]
 
-    def fall(count: int) -> tuple[Array, float]:
-        soil = Soil(preset, fidelity=fidelity, seed=seed)
+def parcel_scaling(fidelity: str, conditions: Conditions) -> list[StepTime]:
+    """Time steps with more and more parcels that fall apart as a column, up to the fidelity's bound."""
+    counts, seed = [n for n in _COUNTS if n <= FIDELITIES[fidelity].most_awake], conditions.seeds[0]
+
+    def column(count: int) -> Soil:
+        soil = Soil(conditions.preset, fidelity=fidelity, seed=seed)
         bulk_m3 = count * soil.parcel_mass_kg / soil.density_kg_m3
         radius_m = (1.2 * bulk_m3 / (math.pi * _SLENDERNESS)) ** (1.0 / 3.0)
-        points = cylinder(radius_m, 2.0 * _SLENDERNESS * radius_m, soil, np.random.default_rng(seed))
-        lowest = points[np.argsort(points[:, 2], kind="stable")][:count]
-        soil.add_parcels(lowest, np.zeros_like(lowest))
-        times, _, awake = timed_steps(soil, [None] * _TICKS.stop)
-        return times[_TICKS], float(awake[_TICKS].mean())
+        return add_column(soil, count, radius_m, 2.0 * _SLENDERNESS * radius_m, seed)
 
-    return _quickest(fall, counts[::2] if quick else counts, 1 if quick else _REPEATS)
-
-
-def grid_scaling(preset: str, fidelity: str, seed: int, *, quick: bool = False) -> list[StepTime]:
-    """Time a dig cycle on the same dig area with more and more cells; arguments as in `parcel_scaling`."""
-
-    def dig(cells: int) -> tuple[Array, float]:
-        size_m = _EXTENT_M / cells
-        soil = Soil(preset, cell_size_m=size_m, fidelity=fidelity, seed=seed, container=TARGET_BOX)
-        soil.reset(cone(soil))
-        return timed_steps(soil, list(dig_cycle()))[0], float(cells)
-
-    return _quickest(dig, _CELLS[::3] if quick else _CELLS, 1 if quick else _REPEATS)
-
-
-def _quickest(run: Callable[[int], tuple[Array, float]], sizes: Sequence[int], repeats: int) -> list[StepTime]:
-    """Run every size some times and take the quickest run of every step."""
-    run(sizes[0])  # compiles or loads the kernels
     found = []
-    for size in sizes:
-        runs = [run(size) for _ in range(repeats)]
-        times = np.min([times for times, _ in runs], axis=0)
-        found.append(StepTime(runs[0][1], float(times.mean()), float(np.percentile(times, 95))))
+    for count in counts[::2] if conditions.quick else counts:
+        steps = quickest_steps(partial(column, count), [None] * _TICKS.stop, 1 if conditions.quick else _REPEATS)
+        found.append(StepTime(float(steps.awake[_TICKS].mean()), float(steps.ms[_TICKS].mean())))
+    return found
+
+
+def grid_scaling(fidelity: str, conditions: Conditions) -> list[StepTime]:
+    """Time a dig cycle on the same dig area with more and more cells."""
+    preset, seed, tools = conditions.preset, conditions.seeds[0], list(dig_cycle())
+    found = []
+    for cells in _CELLS[::3] if conditions.quick else _CELLS:
+        make = partial(pile, preset, fidelity, seed, _EXTENT_M / cells)
+        steps = quickest_steps(make, tools, 1 if conditions.quick else _REPEATS)
+        found.append(StepTime(float(cells), float(steps.ms.mean())))
     return found
 
 
 def scaling_plots(conditions: Conditions) -> tuple[Plot, Plot]:
     """Time both and return the plots `scaling`, with all fidelities, and `scaling_grid`, with the chosen one."""
-    preset, seed, quick = conditions.preset, conditions.seeds[0], conditions.quick
-    parcels = {name: parcel_scaling(preset, name, seed, quick=quick) for name in FIDELITIES}
-    cells = {conditions.fidelity: grid_scaling(preset, conditions.fidelity, seed, quick=quick)}
-    title, y_label = (
-        "Step time and awake parcels, each fidelity up to its bound",
-        "computing time of a step [ms]",
-    )
-    across = "cells along each side of the dig area"
+    parcels = {name: parcel_scaling(name, conditions) for name in FIDELITIES}
+    cells = {conditions.fidelity: grid_scaling(conditions.fidelity, conditions)}
+    y_label = "computing time of a step [ms]"
+    title = "Step time and awake parcels, each fidelity up to its bound"
+    title_grid, across = "Mean step time of a dig cycle and size of the grid", "cells along each side of the dig area"
     return (
         Plot("scaling", title, "awake parcels", y_label, _curves(parcels)),
-        Plot(
-            "scaling_grid",
-            "Mean step time of a dig cycle and size of the grid",
-            across,
-            y_label,
-            _curves(cells),
-        ),
+        Plot("scaling_grid", title_grid, across, y_label, _curves(cells)),
     )
 
 
 def _curves(series: dict[str, list[StepTime]]) -> tuple[Series, ...]:
-    return tuple(
-        Series(name, [time.size for time in times], [time.mean_ms for time in times], style="line")
-        for name, times in series.items()
-    )
+    return tuple(Series(name, *np.transpose(times), "line") for name, times in series.items())

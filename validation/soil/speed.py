@@ -2,21 +2,18 @@
 
 import os
 import platform
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.soil import dig_cycle, timed_steps
+from bench.soil import StepTimes, dig_cycle, pile, quickest_steps, timed_steps
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
-from validation.soil.arrangement import cylinder
-from validation.soil.dig_runs import prepared_soil
-from validation.soil.experiment import Conditions, SoilExperiment
-from validation.soil.results import Check, Plot, Result, Series, Table
-from validation.soil.scaling import scaling_plots
-
-Array = NDArray[np.float64]
+from validation import Array
+from validation.soil.experiment import Conditions, experiment
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
+from validation.soil.scaling import add_column, scaling_plots
 
 CARRY_TICKS = slice(350, 500)
 """The bucket is lifted and swung to the box."""
@@ -30,21 +27,44 @@ _FALL_TICKS = 12
 """A column of parcels falls apart: all of them touch, and few have become ground yet."""
 
 
+@experiment(
+    code="T14",
+    title="Speed",
+    source="Needs of training and of a person at the controls",
+    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "
+    "growing size (the quickest of three runs of each step).",
+    gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
+    "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
+    is_timed=True,
+    reasons={
+        "real time over the mean step": "From the first cut to the end of the curl all parcels in the bucket move, and "
+        "their sub-steps take most of the time.",
+        "half of the steps while carrying": "The swing of this cycle accelerates enough to wake the load several "
+        "times, and while it sleeps its parcels are still carried along one by one.",
+    },
+)
 def run(conditions: Conditions) -> Result:
     """Time a dig cycle and the first moments of a falling column."""
-    times, awake = _quickest(_cycle, conditions)
-    crowd, crowd_awake = _quickest(_crowd, conditions)
-    awake_in_crowd = f"{crowd_awake.mean():.0f} awake parcels"
-    carry = times[CARRY_TICKS]
+    preset, fidelity, seed = conditions.preset, conditions.fidelity, conditions.seeds[0]
+    tools, make_pile = list(dig_cycle()), partial(pile, preset, fidelity, seed)
+
+    def column() -> Soil:
+        return add_column(Soil(preset, (6.0, 6.0), 0.05, fidelity, seed), MANY_PARCELS, 0.45, 1.3, seed)
+
+    timed_steps(make_pile(), tools)  # compiles or loads the kernels
+    cycle = quickest_steps(make_pile, tools, RUNS)
+    crowd = quickest_steps(column, [None] * _FALL_TICKS, RUNS)
+    crowded = f"{crowd.awake.mean():.0f} awake parcels"
+    carry = cycle.ms[CARRY_TICKS]
     return Result(
         checks=(
-            Check("real time over the mean step", 1e3 * TICK_S / float(times.mean()), "×", low=10.0),
-            Check("95 % of the steps of a cycle", _percentile(times, 95), "ms", high=10.0),
+            Check("real time over the mean step", 1e3 * TICK_S / float(cycle.ms.mean()), "×", low=10.0),
+            Check("95 % of the steps of a cycle", _percentile(cycle.ms, 95), "ms", high=10.0),
             Check("half of the steps while carrying", _percentile(carry, 50), "ms", high=1.0),
-            Check(f"95 % of the steps with {awake_in_crowd}", _percentile(crowd, 95), "ms", high=10.0),
+            Check(f"95 % of the steps with {crowded}", _percentile(crowd.ms, 95), "ms", high=10.0),
         ),
-        tables=(_table({"cycle": times, "carrying": carry, awake_in_crowd: crowd}),),
-        plots=(_plot(times, awake), *scaling_plots(conditions)),
+        tables=(_table({"cycle": cycle.ms, "carrying": carry, crowded: crowd.ms}),),
+        plots=(_plot(cycle), *scaling_plots(conditions)),
         remarks=(
             f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one thread computes. A step "
             f"computes the same in every run; the quickest of {RUNS} counts, which other programs disturbed least.",
@@ -56,30 +76,6 @@ def _percentile(values: Array, percent: float) -> float:
     return float(np.percentile(values, percent))
 
 
-def _quickest(timed: Callable[[Conditions], tuple[Array, Array]], conditions: Conditions) -> tuple[Array, Array]:
-    """Return the least time [ms] of every step over some runs, and how many parcels were awake after it."""
-    timed(conditions)  # compiles or loads the kernels
-    times, awake = zip(*(timed(conditions) for _ in range(RUNS)), strict=True)
-    return np.min(times, axis=0), awake[0]
-
-
-def _cycle(conditions: Conditions) -> tuple[Array, Array]:
-    """Return the time [ms] of every step of the dig cycle, and how many parcels were awake after it."""
-    soil = prepared_soil(conditions.preset, conditions.fidelity, conditions.seeds[0])
-    times, _, awake = timed_steps(soil, list(dig_cycle()))
-    return times, awake
-
-
-def _crowd(conditions: Conditions) -> tuple[Array, Array]:
-    """Return the times [ms] of the first steps of a column of parcels, and how many were awake after them."""
-    soil = Soil(conditions.preset, (6.0, 6.0), 0.05, conditions.fidelity, conditions.seeds[0])
-    points = cylinder(0.45, 1.3, soil, np.random.default_rng(conditions.seeds[0]))
-    points = points[np.argsort(points[:, 2], kind="stable")][:MANY_PARCELS]
-    soil.add_parcels(points, np.zeros_like(points))
-    times, _, awake = timed_steps(soil, [None] * _FALL_TICKS)
-    return times, awake
-
-
 def _table(times: dict[str, Array]) -> Table:
     rows = [
         (name, float(t.mean()), _percentile(t, 50), _percentile(t, 95), float(t.max())) for name, t in times.items()
@@ -87,34 +83,11 @@ def _table(times: dict[str, Array]) -> Table:
     return Table(("steps", "mean [ms]", "50 % [ms]", "95 % [ms]", "worst [ms]"), tuple(rows))
 
 
-def _plot(times: Array, awake: Array) -> Plot:
-    seconds = TICK_S * np.arange(1, len(times) + 1)
-    return Plot(
-        "step_times",
-        "Step times of a dig cycle",
-        "time in the cycle [s]",
-        "computing time [ms]; awake parcels / 100",
-        (
-            Series("computing time of a step [ms]", seconds, times, style="line"),
-            Series("awake parcels / 100", seconds, awake / 100.0, style="line"),
-        ),
+def _plot(cycle: StepTimes) -> Plot:
+    seconds = TICK_S * np.arange(1, len(cycle.ms) + 1)
+    curves = (
+        Series("computing time of a step [ms]", seconds, cycle.ms, "line"),
+        Series("awake parcels / 100", seconds, cycle.awake / 100.0, "line"),
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T14",
-    title="Speed",
-    source="Needs of training and of a person at the controls",
-    measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "
-    "growing size (the quickest of three runs of each step).",
-    gate="10 × real time on average and 95 % of the steps below 10 ms over a cycle; half of the steps below 1 ms while "
-    "carrying; 95 % below 10 ms with 1000 awake parcels. Times depend on the machine: they decide no exit code.",
-    run=run,
-    is_timed=True,
-    reasons={
-        "real time over the mean step": "From the first cut to the end of the curl all parcels in the bucket move, and "
-        "their sub-steps take most of the time.",
-        "half of the steps while carrying": "The swing of this cycle accelerates enough to wake the load several "
-        "times, and while it sleeps its parcels are still carried along one by one.",
-    },
-)
+    y_label = "computing time [ms]; awake parcels / 100"
+    return Plot("step_times", "Step times of a dig cycle", "time in the cycle [s]", y_label, curves)

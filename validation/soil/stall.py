@@ -1,7 +1,7 @@
 """T15: the soil can hold the machine, but it never drives it."""
 
 import dataclasses
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,10 +11,10 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
-from validation.soil.experiment import Conditions, SoilExperiment, track
-from validation.soil.results import Check, Plot, Result, Series, Table
-
-Array = NDArray[np.float64]
+from validation import Array
+from validation.soil.experiment import Conditions, experiment, track
+from validation.soil.plots import Plot, Series
+from validation.soil.results import Check, Result, Table
 
 START_RAD = np.array([0.0, 0.6, -1.2, -0.8])
 GROUND_M = 0.6
@@ -41,23 +41,14 @@ POWER_W = 1e-3
 """Our own: what counts as no power, a millionth of that of the machine."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Dig:
-    """One dig with the machine.
+class Dig(NamedTuple):
+    """One dig with the machine, tick by tick."""
 
-    Attributes:
-        power_w: Power of the soil's resistance at the end of every tick.
-        force_n: Size of the soil's answer in every tick.
-        edge_speed_m_s: Speed of the cutting edge in the direction in which the arm would move it.
-        edge_w: (n, 3) cutting edge after every tick [m].
-        phase: (n,) number of the phase of every tick.
-    """
-
-    power_w: Array
-    force_n: Array
-    edge_speed_m_s: Array
-    edge_w: Array
-    phase: NDArray[np.int64]
+    power_w: Array  # of the soil's resistance at the end of the tick
+    force_n: Array  # size of the soil's answer
+    edge_speed_m_s: Array  # of the cutting edge in the direction in which the arm would move it
+    edge_w: Array  # (n, 3) cutting edge after the tick [m]
+    phase: Array  # number of the phase
 
     def during(self, *names: str) -> NDArray[np.bool_]:
         """Return which ticks belong to these phases."""
@@ -70,35 +61,22 @@ def hard_ground(parameters: SoilParameters) -> SoilParameters:
 
 
 def dig(parameters: SoilParameters, *, fidelity: str) -> Dig:
-    """Lower the bucket into level ground, drag, hold, drag on and lift.
-
-    Args:
-        parameters: The soil.
-        fidelity: Numerical effort.
-    """
+    """Lower the bucket into level ground, drag, hold, drag on and lift."""
     machine = ExcavatorMachine(container=TARGET_BOX)
     soil = Soil(parameters, DIG_AREA_EXTENT_M, 0.05, fidelity, container=TARGET_BOX)
     soil.reset(np.full(soil.heights_m.shape, GROUND_M))
     machine.reset(START_RAD)
-    powers, forces, speeds, edges, phases = [], [], [], [], []
-    for number, (_, command, ticks) in enumerate(PHASES):
-        for _ in range(ticks):
+    ticks = []
+    for number, (_, command, count) in enumerate(PHASES):
+        for _ in range(count):
             ahead, before = _arm_direction(machine), machine.cutting_edge_pos_w
             # Without its load, the soil's resistance is the only force from outside.
             reaction = dataclasses.replace(soil.step(TICK_S, machine.tool()), payload_mass_kg=0.0)
             machine.tick(np.array(command), reaction)
-            edges.append(machine.cutting_edge_pos_w)
-            speeds.append(float((edges[-1] - before) @ ahead) / TICK_S)
-            powers.append(float(machine.data.qfrc_applied @ machine.data.qvel))  # of the soil alone
-            forces.append(float(np.linalg.norm(reaction.force_w_n)))
-            phases.append(number)
-    return Dig(
-        power_w=np.array(powers),
-        force_n=np.array(forces),
-        edge_speed_m_s=np.array(speeds),
-        edge_w=np.array(edges),
-        phase=np.array(phases),
-    )
+            power = machine.data.qfrc_applied @ machine.data.qvel  # of the soil alone
+            edge = machine.cutting_edge_pos_w
+            ticks.append((power, np.linalg.norm(reaction.force_w_n), (edge - before) @ ahead / TICK_S, edge, number))
+    return Dig(*(np.array(values) for values in zip(*ticks, strict=True)))
 
 
 def _arm_direction(machine: ExcavatorMachine) -> Array:
@@ -110,6 +88,15 @@ def _arm_direction(machine: ExcavatorMachine) -> Array:
     return direction
 
 
+@experiment(
+    code="T15",
+    title="Stall and energy",
+    source="Mechanics: resistance is no drive; friction holds what rests",
+    measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
+    "soil, and in ground so hard that it stalls. The load is left out, so that the resistance is the only force from "
+    "outside; its power at the end of every tick.",
+    gate="the soil never reverses the blade, a bucket held in it stays, and no force puts energy into the machine",
+)
 def run(conditions: Conditions) -> Result:
     """Dig in the soil and in hard ground."""
     parameters = PRESETS[conditions.preset]
@@ -121,11 +108,9 @@ def run(conditions: Conditions) -> Result:
         dragged, free = one.during("drag", "drag on"), one.edge_speed_m_s.max()
         slowest = float(one.edge_speed_m_s[one.during("drag on")].mean())
         rows.append((name, float(one.force_n.max()) / 1e3, slowest, float(free), float(one.power_w[dragged].min())))
-    header = (
-        *("soil", "greatest force [kN]", "mean speed dragging on [m/s]", "greatest speed [m/s]"),
-        "greatest power taken [W]",
-    )
-    return Result(checks=tuple(checks), tables=(Table(header, tuple(rows)),), plots=(_plot(digs),))
+    speeds = ("mean speed dragging on [m/s]", "greatest speed [m/s]")
+    table = Table(("soil", "greatest force [kN]", *speeds, "greatest power taken [W]"), tuple(rows))
+    return Result(checks=tuple(checks), tables=(table,), plots=(_plot(digs),))
 
 
 def _checks(name: str, one: Dig) -> list[Check]:
@@ -145,25 +130,8 @@ def _plot(digs: dict[str, Dig]) -> Plot:
     curves = []
     for k, (name, one) in enumerate(digs.items()):
         seconds = TICK_S * np.arange(1, len(one.force_n) + 1)
-        force, speed = one.force_n / 1e4, one.edge_speed_m_s
-        curves.append(Series(f"speed, {name} [m/s]", seconds, speed, style="line", color=k))
-        curves.append(Series(f"force, {name} [10 kN]", seconds, force, style="dashed", color=k))
+        curves.append(Series(f"speed, {name} [m/s]", seconds, one.edge_speed_m_s, "line", color=k))
+        curves.append(Series(f"force, {name} [10 kN]", seconds, one.force_n / 1e4, "dashed", color=k))
     return Plot(
-        "stall",
-        "Lower, drag, hold, drag on, lift",
-        "time [s]",
-        "speed of the edge [m/s]; force [10 kN]",
-        tuple(curves),
+        "stall", "Lower, drag, hold, drag on, lift", "time [s]", "speed of the edge [m/s]; force [10 kN]", tuple(curves)
     )
-
-
-EXPERIMENT = SoilExperiment(
-    code="T15",
-    title="Stall and energy",
-    source="Mechanics: resistance is no drive; friction holds what rests",
-    measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
-    "soil, and in ground so hard that it stalls. The load is left out, so that the resistance is the only force from "
-    "outside; its power at the end of every tick.",
-    gate="the soil never reverses the blade, a bucket held in it stays, and no force puts energy into the machine",
-    run=run,
-)

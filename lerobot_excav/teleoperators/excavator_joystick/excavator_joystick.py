@@ -8,8 +8,10 @@ from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
-from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, StickMapping
+from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, joint_commands
 from lerobot_excav.teleoperators.simulation_teleoperator import SimulationTeleoperator
+
+OpenDevice = Callable[[ExcavatorJoystickConfig], Gamepad]
 
 
 class ExcavatorJoystick(SimulationTeleoperator):
@@ -24,15 +26,17 @@ class ExcavatorJoystick(SimulationTeleoperator):
     name = "excavator_joystick"
     action_names = ACTION_NAMES
 
-    def __init__(self, config: ExcavatorJoystickConfig, *, open_device: Callable[..., Gamepad] = open_gamepad) -> None:
+    def __init__(
+        self,
+        config: ExcavatorJoystickConfig,
+        *,
+        open_device: OpenDevice = open_gamepad,
+    ) -> None:
         super().__init__(config)
         self.config = config
         self._open_device = open_device
         self._device: Gamepad | None = None
         self._presses = PressDetector()
-        self._mapping = StickMapping(
-            pattern=config.pattern, dead_zone=config.dead_zone, expo=config.expo, invert=tuple(config.invert)
-        )
 
     @property
     def is_connected(self) -> bool:
@@ -48,13 +52,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
         """
         if self._device is not None:
             raise DeviceError(f"the gamepad {self._device.name!r} is connected already; call disconnect() first.")
-        self._device = self._open_device(
-            index=self.config.device_index,
-            name=self.config.device_name,
-            buttons=self.config.buttons,
-            joystick_axes=self.config.joystick_axes,
-            joystick_buttons=self.config.joystick_buttons,
-        )
+        self._device = self._open_device(self.config)
         self._presses = PressDetector()
 
     def get_action(self) -> dict[str, float]:
@@ -66,8 +64,8 @@ class ExcavatorJoystick(SimulationTeleoperator):
         if self._device is None:
             raise DeviceError("the gamepad is not connected; call connect() first.")
         axes, buttons = self._device.read()
-        command = self._mapping.command(axes)
-        action = dict(zip(ACTION_NAMES, command.values(), strict=True))
+        response = {name: getattr(self.config, name) for name in ("pattern", "dead_zone", "expo", "invert")}
+        action = dict(zip(ACTION_NAMES, joint_commands(axes, **response).values(), strict=True))
         for button, key in zip(self.config.buttons, (REINITIALISE, NEXT_SCENE), strict=True):
             if self._presses.pressed(button, is_down=buttons[button]):
                 action[key] = 1.0

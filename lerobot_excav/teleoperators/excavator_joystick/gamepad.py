@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES
 
 _FULL_DEFLECTION = 32767  # SDL reports controller axes as 16-bit integers
@@ -103,22 +104,8 @@ class PlainJoystick:
             self._joystick.quit()
 
 
-def open_gamepad(
-    *,
-    index: int,
-    name: str | None,
-    buttons: tuple[str, ...],
-    joystick_axes: Mapping[str, int] | None,
-    joystick_buttons: Mapping[str, int] | None,
-) -> Gamepad:
+def open_gamepad(config: ExcavatorJoystickConfig) -> Gamepad:
     """Open the chosen device.
-
-    Args:
-        index: Position among the connected devices; used when `name` is None.
-        name: Part of the device's name, any case.
-        buttons: Names of the buttons in use.
-        joystick_axes: Number of each axis, for a device that SDL does not know as a gamepad.
-        joystick_buttons: Number of each button in use, for such a device.
 
     Raises:
         DeviceError: The device is not there, or it is a joystick that SDL does not know and the configuration
@@ -126,19 +113,19 @@ def open_gamepad(
     """
     pygame, sdl_controller = _start_sdl()
     found = [pygame.joystick.Joystick(i).get_name() for i in range(pygame.joystick.get_count())]
-    chosen = choose_device(found, index=index, name=name)
+    chosen = choose_device(found, index=config.device_index, name=config.device_name)
     if sdl_controller.is_controller(chosen):
-        return KnownGamepad(pygame, sdl_controller.Controller(chosen), buttons)
+        return KnownGamepad(pygame, sdl_controller.Controller(chosen), config.buttons)
     joystick = pygame.joystick.Joystick(chosen)
-    if joystick_axes is None or joystick_buttons is None:
+    if config.joystick_axes is None or config.joystick_buttons is None:
         raise DeviceError(
             f"SDL does not know {found[chosen]!r} as a gamepad ({joystick.get_numaxes()} axes, "
             f"{joystick.get_numbuttons()} buttons), so its axes have no names. Number them, for example "
             "--teleop.joystick_axes='{left_x: 0, left_y: 1, right_x: 3, right_y: 4}' "
-            f"--teleop.joystick_buttons='{{{buttons[0]}: 6, {buttons[1]}: 7}}', or give SDL a mapping in the "
-            "environment variable SDL_GAMECONTROLLERCONFIG."
+            f"--teleop.joystick_buttons='{{{config.buttons[0]}: 6, {config.buttons[1]}: 7}}', or give SDL a mapping in "
+            "the environment variable SDL_GAMECONTROLLERCONFIG."
         )
-    return PlainJoystick(pygame, joystick, joystick_axes, joystick_buttons)
+    return PlainJoystick(pygame, joystick, config.joystick_axes, config.joystick_buttons)
 
 
 def choose_device(found: list[str], *, index: int, name: str | None) -> int:

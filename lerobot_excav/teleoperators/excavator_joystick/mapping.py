@@ -6,7 +6,6 @@ towards the operator, as SDL reports them.
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
 
 AXES = ("left_x", "left_y", "right_x", "right_y")
 
@@ -19,12 +18,7 @@ PATTERNS: Mapping[str, Mapping[str, tuple[str, float]]] = {
         "bucket": ("right_x", 1.0),  # lever left: curl, which is negative
     },
     # SAE J1814 ("backhoe"): boom and arm change hands.
-    "sae": {
-        "swing": ("left_x", -1.0),
-        "boom": ("left_y", 1.0),
-        "arm": ("right_y", -1.0),
-        "bucket": ("right_x", 1.0),
-    },
+    "sae": {"swing": ("left_x", -1.0), "boom": ("left_y", 1.0), "arm": ("right_y", -1.0), "bucket": ("right_x", 1.0)},
 }
 """For each joint of a control pattern, the axis that drives it and the axis' sign."""
 
@@ -46,35 +40,23 @@ def respond(value: float, *, dead_zone: float, expo: float = 0.0) -> float:
     return math.copysign((1.0 - expo) * travel + expo * travel**3, value)
 
 
-@dataclass(frozen=True, kw_only=True)
-class StickMapping:
-    """Turn axis positions into commands of the joints.
+def joint_commands(
+    axes: Mapping[str, float], *, pattern: str, dead_zone: float, expo: float, invert: Collection[str]
+) -> dict[str, float]:
+    """Return the command of each joint in [-1, 1], in the order swing, boom, arm, bucket.
 
-    Attributes:
+    Args:
+        axes: Position of each axis of `AXES` in [-1, 1].
         pattern: Name of a control pattern, `iso` or `sae`.
         dead_zone: See `respond`.
         expo: See `respond`.
         invert: Axes whose sign is turned around.
     """
-
-    pattern: str = "iso"
-    dead_zone: float = 0.08
-    expo: float = 0.0
-    invert: Collection[str] = field(default_factory=tuple)
-
-    def command(self, axes: Mapping[str, float]) -> dict[str, float]:
-        """Return the command of each joint in [-1, 1], in the order swing, boom, arm, bucket.
-
-        Args:
-            axes: Position of each axis of `AXES` in [-1, 1].
-        """
-        return {joint: self._joint_command(axes, joint) for joint in PATTERNS[self.pattern]}
-
-    def _joint_command(self, axes: Mapping[str, float], joint: str) -> float:
-        axis, sign = PATTERNS[self.pattern][joint]
-        if axis in self.invert:
-            sign = -sign
-        return sign * respond(axes[axis], dead_zone=self.dead_zone, expo=self.expo) + 0.0  # no negative zero
+    commands = {}
+    for joint, (axis, sign) in PATTERNS[pattern].items():
+        value = sign * respond(axes[axis], dead_zone=dead_zone, expo=expo)
+        commands[joint] = (-value if axis in invert else value) + 0.0  # no negative zero
+    return commands
 
 
 class PressDetector:

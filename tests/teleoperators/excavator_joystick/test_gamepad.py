@@ -7,6 +7,7 @@ import pytest
 
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.teleoperators.excavator_joystick import gamepad
+from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import (
     KnownGamepad,
     PlainJoystick,
@@ -17,7 +18,6 @@ from lerobot_excav.teleoperators.excavator_joystick.gamepad import (
 BUTTONS = ("back", "start")
 AXES = {"left_x": 0, "left_y": 1, "right_x": 3, "right_y": 4}
 NUMBERS = {"joystick_axes": AXES, "joystick_buttons": {"back": 6, "start": 7}}
-UNNUMBERED = dict.fromkeys(NUMBERS)
 JOYDEVICEREMOVED = 17
 
 
@@ -84,10 +84,9 @@ def test_numbers_beyond_the_joystick_are_refused(sdl, joystick):
         PlainJoystick(sdl, joystick, AXES | {"right_y": 9}, {"back": 6, "start": 7})
 
 
-def test_devices_are_chosen_by_position_or_by_part_of_the_name():
-    found = ["Left Stick", "Xbox Pad", "Pad 2"]
-    assert choose_device(found, index=2, name=None) == 2
-    assert choose_device(found, index=0, name="pad") == 1
+@pytest.mark.parametrize(("index", "name", "chosen"), [(2, None, 2), (0, "pad", 1), (2, "stick", 0)])
+def test_devices_are_chosen_by_position_or_by_part_of_the_name(index, name, chosen):
+    assert choose_device(["Left Stick", "Xbox Pad", "Pad 2"], index=index, name=name) == chosen
 
 
 @pytest.mark.parametrize(
@@ -95,12 +94,7 @@ def test_devices_are_chosen_by_position_or_by_part_of_the_name():
     [
         ([], 0, None, "teleop.device_index=0 does not match a gamepad; connected: none. Plug one in"),
         (["Xbox Pad"], 1, None, "teleop.device_index=1 does not match a gamepad; connected: 0: 'Xbox Pad'"),
-        (
-            ["Xbox Pad"],
-            0,
-            "stick",
-            "teleop.device_name='stick' does not match a gamepad; connected: 0: 'Xbox",
-        ),
+        (["Xbox Pad"], 0, "stick", "teleop.device_name='stick' does not match a gamepad; connected: 0: 'Xbox"),
     ],
 )
 def test_a_missing_device_is_described(found, index, name, message):
@@ -111,18 +105,20 @@ def test_a_missing_device_is_described(found, index, name, message):
 
 
 def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(monkeypatch, sdl, controller):
-    def opened(*, known, numbers):
+    def opened(*, known, **numbers):
         sdl_controller = SimpleNamespace(is_controller=lambda _: known, Controller=lambda _: controller)
         monkeypatch.setattr(gamepad, "_start_sdl", lambda: (sdl, sdl_controller))
-        return open_gamepad(index=0, name=None, buttons=BUTTONS, **numbers)
+        return open_gamepad(ExcavatorJoystickConfig(**numbers))
 
-    assert isinstance(opened(known=True, numbers=UNNUMBERED), KnownGamepad)
-    assert isinstance(opened(known=False, numbers=NUMBERS), PlainJoystick)
+    assert isinstance(opened(known=True), KnownGamepad)
+    assert isinstance(opened(known=False, **NUMBERS), PlainJoystick)
     unknown = r"does not know 'Stick' as a gamepad \(5 axes, 8 buttons\).*joystick_axes='\{left_x: 0"
     with pytest.raises(DeviceError, match=unknown):
-        opened(known=False, numbers=UNNUMBERED)
+        opened(known=False)
+    with pytest.raises(DeviceError, match=r"teleop\.device_index=1"):
+        opened(known=True, device_index=1)
 
 
 def test_sdl_itself_starts_without_a_screen():
     with pytest.raises(DeviceError, match=r"teleop\.device_name='no such pad'"):
-        open_gamepad(index=0, name="no such pad", buttons=BUTTONS, **UNNUMBERED)
+        open_gamepad(ExcavatorJoystickConfig(device_name="no such pad"))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PressDetector, StickMapping, respond
+from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PressDetector, joint_commands, respond
 
 deflections = st.floats(-1.5, 1.5)
 dead_zones = st.floats(0.0, 0.9)
@@ -50,13 +50,13 @@ def test_the_response_has_no_step_and_never_falls(value, dead_zone, expo, more):
         ("sae", "right_y", "arm", -1),
     ],
 )
-def test_each_axis_drives_one_joint(pattern, axis, joint, sign):
-    command = StickMapping(pattern=pattern).command(CENTRED | {axis: 1.0})
-    assert command == dict.fromkeys(("swing", "boom", "arm", "bucket"), 0.0) | {joint: float(sign)}
-
-
-def test_centred_sticks_give_plain_zeros():
-    assert str(StickMapping().command(CENTRED)) == "{'swing': 0.0, 'boom': 0.0, 'arm': 0.0, 'bucket': 0.0}"
+def test_each_axis_drives_one_joint_and_centred_sticks_give_plain_zeros(pattern, axis, joint, sign):
+    still = "{'swing': 0.0, 'boom': 0.0, 'arm': 0.0, 'bucket': 0.0}"
+    settings = {"pattern": pattern, "dead_zone": 0.08, "expo": 0.0}
+    for invert, turned in (((), sign), ((axis,), -sign)):
+        command = joint_commands(CENTRED | {axis: 1.0}, invert=invert, **settings)
+        assert command == dict.fromkeys(command, 0.0) | {joint: float(turned)}
+        assert str(joint_commands(CENTRED, invert=invert, **settings)) == still
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from validation import Array
 
 
 def inside(planes: Array, points_t: Array) -> NDArray[np.bool_]:

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
@@ -15,8 +14,7 @@ from lerobot_excav.envs.soil.parcels.contact import (
     TANGENTIAL_STIFFNESS,
     Law,
 )
-
-Array = NDArray[np.float64]
+from validation import Array
 
 
 def normal_force(overlap: float, separation_speed: float, stiffness: float, mass: float, radius: float) -> float:

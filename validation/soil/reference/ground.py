@@ -1,21 +1,13 @@
 """Twin of `parcels.ground`: the bilinear surface as a sum over its corners."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site
-from lerobot_excav.envs.soil.parcels.store import (
-    SHELTERED,
-    TOUCHES_BOX_FLOOR,
-    TOUCHES_GROUND,
-    TOUCHES_OUTSIDE,
-    State,
-)
+from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
+from validation import Array
 from validation.soil.reference.contact import wall_contact
-
-Array = NDArray[np.float64]
 
 
 def surface(heights: Array, grid: Grid, point: Array) -> tuple[float, Array]:
@@ -67,15 +59,7 @@ def press_ground(state: State, site: Site, law: Law, dt: float) -> None:
         if not state.near_plate[i]:
             state.positions[i] += float(np.clip(LEAST_GAP * radius - gap, 0.0, LIFT * radius)) * normal
         force, torque = wall_contact(
-            springs,
-            normal,
-            max(gap, 0.0),
-            state.velocities[i],
-            state.spins[i],
-            float(state.masses[i]),
-            radius,
-            law,
-            dt,
+            springs, normal, max(gap, 0.0), state.velocities[i], state.spins[i], float(state.masses[i]), radius, law, dt
         )
         state.forces[i] += force
         state.torques[i] += torque

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.pairs import SKIN
 from lerobot_excav.envs.soil.parcels.store import State
+from validation import Array
 from validation.soil.reference.contact import contact
 
-Array = NDArray[np.float64]
 Memory = dict[tuple[int, int], Array]
 """Springs (6,) of each touching pair i < j [m]."""
 

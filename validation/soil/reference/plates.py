@@ -1,14 +1,12 @@
 """Twin of `parcels.plates`: a sphere against thin plates, each a convex polygon in space."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
+from validation import Array
 from validation.soil.reference.contact import wall_contact
-
-Array = NDArray[np.float64]
 
 _DEEP_M = 100.0
 """How far box walls reach down: parcels below the floor of the box meet them too."""
@@ -104,15 +102,7 @@ def _press(state: State, i: int, plate: int, away: Array, velocity: Array, law: 
     state.positions[i] += back * normal
     state.velocities[i] += max(0.0, closing - LARGEST_APPROACH * (gap + back) / dt) * normal
     force, torque = wall_contact(
-        springs,
-        normal,
-        gap,
-        state.velocities[i] - velocity,
-        state.spins[i],
-        float(state.masses[i]),
-        radius,
-        law,
-        dt,
+        springs, normal, gap, state.velocities[i] - velocity, state.spins[i], float(state.masses[i]), radius, law, dt
     )
     state.forces[i] += force
     state.torques[i] += torque
