@@ -16,7 +16,7 @@ def test_blocks_lie_in_their_area_and_apart():
         assert x_w.max() <= layout.BLOCK_AREA_X_W[1]
         assert y_w.min() >= layout.BLOCK_AREA_Y_W[0]
         assert y_w.max() <= layout.BLOCK_AREA_Y_W[1]
-        assert (z_w == layout.block_rest_height_m()).all()
+        assert (z_w == layout.BLOCK_REST_M).all()
         distance = np.linalg.norm(scene.block_pos_w[:, None] - scene.block_pos_w[None], axis=-1)
         assert distance[~np.eye(4, dtype=bool)].min() >= layout.BLOCK_SPACING_M
 

@@ -8,7 +8,7 @@ from lerobot_excav.envs.tasks.grasp.task import GraspTask
 from lerobot_excav.errors import ConfigurationError
 
 SCENE = draw_scene("train", 2)
-IN_TRAY = (*layout.TRAY_POS_W, layout.TRAY_HEIGHT_M + layout.block_rest_height_m())
+IN_TRAY = (*layout.TRAY_POS_W, layout.TRAY_HEIGHT_M + layout.BLOCK_REST_M)
 
 
 def put(workcell, block, position_w):
@@ -55,7 +55,7 @@ def test_after_a_change_of_command_the_first_grasped_block_is_asked_again(task, 
     def grasp(block):
         touching = np.zeros((2, layout.BLOCK_COUNT), dtype=bool)
         if block is not None:
-            put(workcell, block, (0.1, 0.5, layout.block_rest_height_m() + 0.1))
+            put(workcell, block, (0.1, 0.5, layout.BLOCK_REST_M + 0.1))
             hold(workcell, 1)
             touching[:, block] = True
         monkeypatch.setattr(workcell, "fingers_touching", lambda: touching)
