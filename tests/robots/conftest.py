@@ -2,8 +2,7 @@
 
 import logging
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
@@ -11,7 +10,7 @@ RunCommand = Callable[..., None]
 
 
 @pytest.fixture
-def logging_is_restored() -> Iterator[None]:
+def logging_is_restored():
     """LeRobot's commands replace the handlers of the root logger."""
     root = logging.getLogger()
     level, handlers = root.level, list(root.handlers)
@@ -21,10 +20,10 @@ def logging_is_restored() -> Iterator[None]:
 
 
 @pytest.fixture
-def run_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, logging_is_restored: None) -> RunCommand:
+def run_command(monkeypatch, tmp_path, logging_is_restored):
     """Run a command on the dataset `data`, with the session log `session.jsonl`."""
 
-    def _run(main: Callable[[], None], *arguments: str) -> None:
+    def _run(main, *arguments):
         common = [
             f"--robot.calibration_dir={tmp_path}",
             f"--robot.session_log={tmp_path / 'session.jsonl'}",

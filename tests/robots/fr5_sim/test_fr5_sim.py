@@ -1,7 +1,6 @@
 """What only the simulated arm does; what it shares with other robots is in tests/contract."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,11 +20,11 @@ MakeRobot = Callable[..., FR5Sim]
 
 
 @pytest.fixture
-def make_robot(tmp_path: Path) -> Iterator[MakeRobot]:
+def make_robot(tmp_path):
     """Make a connected robot; settings go to its configuration."""
     robots = []
 
-    def _make(**settings: Any) -> FR5Sim:
+    def _make(**settings):
         common = {"session_log": tmp_path / "session.jsonl", "calibration_dir": tmp_path}
         size = {"observation_height": 32, "observation_width": 48}
         robots.append(FR5Sim(FR5SimConfig(**(common | size | settings))))
@@ -38,24 +37,24 @@ def make_robot(tmp_path: Path) -> Iterator[MakeRobot]:
             robot.disconnect()
 
 
-def positions(robot: FR5Sim) -> dict[str, float]:
+def positions(robot):
     return {name: robot.get_observation()[name] for name in NAMES}
 
 
-def swung(robot: FR5Sim, *, by: float = 0.3) -> dict[str, float]:
+def swung(robot, *, by=0.3):
     """Return an action that turns the first joint away [rad] and closes the gripper."""
     start = positions(robot)
     return start | {"j1.pos": start["j1.pos"] + by, "gripper.pos": 0.0}
 
 
-def test_features_name_six_joints_and_the_gripper(tmp_path: Path) -> None:
+def test_features_name_six_joints_and_the_gripper(tmp_path):
     robot = FR5Sim(FR5SimConfig(calibration_dir=tmp_path))
     assert list(robot.observation_features) == [*NAMES, "main", "top", "target_mask"]
     assert list(robot.action_features) == list(NAMES)
     assert robot.config.fps == 50
 
 
-def test_settings_reach_the_environment(make_robot: MakeRobot) -> None:
+def test_settings_reach_the_environment(make_robot):
     robot = make_robot(fps=25, scene_set="val", scene_id=2, target_id=1, observation_height=64)
     env = FR5GraspEnv(scene_set="val", fps=25, observation_height=64, observation_width=48)
     expected, _ = env.reset(options={"scene_id": 2, "target_id": 1})
@@ -67,12 +66,12 @@ def test_settings_reach_the_environment(make_robot: MakeRobot) -> None:
     assert robot.env.fps == 25
 
 
-def test_commands_are_clipped_to_the_limits_of_the_arm(make_robot: MakeRobot) -> None:
+def test_commands_are_clipped_to_the_limits_of_the_arm(make_robot):
     sent = make_robot().send_action(dict.fromkeys(NAMES, -9.0))
     assert list(sent.values()) == pytest.approx([*JOINT_LIMITS_RAD[:, 0], 0.0])
 
 
-def test_an_episode_never_ends_by_itself(make_robot: MakeRobot) -> None:
+def test_an_episode_never_ends_by_itself(make_robot):
     robot = make_robot(fps=10)
     action = positions(robot)
     for _ in range(90):  # longer than the 8 s of an evaluated episode
@@ -81,7 +80,7 @@ def test_an_episode_never_ends_by_itself(make_robot: MakeRobot) -> None:
     assert positions(robot)["j1.pos"] != pytest.approx(action["j1.pos"], abs=0.01)
 
 
-def test_a_rollout_drives_it_home_by_an_ordinary_motion(make_robot: MakeRobot) -> None:
+def test_a_rollout_drives_it_home_by_an_ordinary_motion(make_robot):
     robot = make_robot()
     home, episodes = positions(robot), robot.episode_count
     away = swung(robot)

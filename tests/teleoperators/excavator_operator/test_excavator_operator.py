@@ -1,7 +1,5 @@
 """What only the excavator's scripted operator does; what it shares with others is in tests/contract."""
 
-from pathlib import Path
-
 import numpy as np
 
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
@@ -12,7 +10,7 @@ from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator im
 from lerobot_excav.teleoperators.excavator_operator.excavator_operator import ExcavatorOperator
 
 
-def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> None:
+def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path):
     operator = ExcavatorOperator(ExcavatorOperatorConfig(calibration_dir=tmp_path, seed=3))
     operator.connect()
     size = {"observation_height": 32, "observation_width": 32}

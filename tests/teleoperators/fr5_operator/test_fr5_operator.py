@@ -1,7 +1,5 @@
 """What only the arm's scripted operator does; what it shares with others is in tests/contract."""
 
-from pathlib import Path
-
 import numpy as np
 
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
@@ -14,7 +12,7 @@ from lerobot_excav.teleoperators.fr5_operator.fr5_operator import FR5Operator
 SIZE = {"observation_height": 32, "observation_width": 32}
 
 
-def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> None:
+def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path):
     operator = FR5Operator(FR5OperatorConfig(calibration_dir=tmp_path, seed=3))
     operator.connect()
     robot = FR5Sim(FR5SimConfig(calibration_dir=tmp_path, scene_id=1, target_id=2, **SIZE))
@@ -34,7 +32,7 @@ def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> 
     env.close()
 
 
-def test_it_puts_the_commanded_block_into_the_tray(tmp_path: Path) -> None:
+def test_it_puts_the_commanded_block_into_the_tray(tmp_path):
     operator = FR5Operator(FR5OperatorConfig(calibration_dir=tmp_path))
     operator.connect()
     robot = FR5Sim(FR5SimConfig(calibration_dir=tmp_path, scene_id=4, target_id=3, fps=25, **SIZE))

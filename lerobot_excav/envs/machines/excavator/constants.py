@@ -59,7 +59,7 @@ PAYLOAD_GYRATION_M = (0.25, 0.22, 0.29)  # box of 0.72 m x 0.70 m x 0.45 m about
 # --- actuation, one value per joint -----------------------------------------------------------------
 
 JOINT_TORQUE_NM = (28e3, 150e3, 105e3, 63e3)
-"""Bucket, arm: DX80R breakout 54.6, 40.9 kN times lever; boom: twice its holding torque; swing: ramp (kind: derived)."""
+"""Bucket, arm: DX80R breakout (54.6, 40.9 kN) by lever; boom: twice its holding torque; swing: ramp (kind: derived)."""
 JOINT_SPEED_RAD_S = (1.0, 0.55, 0.80, 1.30)
 """Full stick; swing: DX80R 9.6 rpm; others from full-range times of 3.6, 2.7 and 2.4 s (kind: derived)."""
 JOINT_ACCEL_RAD_S2 = (0.65, 0.8, 1.2, 2.5)  # swing as published; others by feel (kind: derived)

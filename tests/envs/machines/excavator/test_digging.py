@@ -24,11 +24,7 @@ def machine():
 
 def reaction_of(patches):
     return Reaction(
-        force_w_n=np.zeros(3),
-        torque_w_nm=np.zeros(3),
-        payload_mass_kg=0.0,
-        payload_com_t=COM_T,
-        patches=patches,
+        force_w_n=np.zeros(3), torque_w_nm=np.zeros(3), payload_mass_kg=0.0, payload_com_t=COM_T, patches=patches
     )
 
 

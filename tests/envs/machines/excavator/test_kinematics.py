@@ -65,9 +65,7 @@ def test_inverse_returns_a_pose_that_reaches_or_none(radius, height, pitch, swin
 
 
 @pytest.mark.parametrize(
-    ("radius", "height"),
-    [(7.5, 0.0), (3.0, -5.0), (3.0, 8.0), (-3.0, 1.0)],
-    ids=["far", "deep", "high", "behind"],
+    ("radius", "height"), [(7.5, 0.0), (3.0, -5.0), (3.0, 8.0), (-3.0, 1.0)], ids=["far", "deep", "high", "behind"]
 )
 def test_unreachable_points_have_no_pose(radius, height):
     assert inverse(radius, height, -1.5, 0.0) is None

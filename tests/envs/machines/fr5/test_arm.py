@@ -24,12 +24,7 @@ def denavit_hartenberg(joint_pos):
     pose = np.eye(4)
     for q, a_i, d_i, alpha_i in zip(joint_pos, a, d, alpha, strict=True):
         c, s, ca, sa = np.cos(q), np.sin(q), np.cos(alpha_i), np.sin(alpha_i)
-        pose = pose @ [
-            [c, -s * ca, s * sa, a_i * c],
-            [s, c * ca, -c * sa, a_i * s],
-            [0, sa, ca, d_i],
-            [0, 0, 0, 1],
-        ]
+        pose = pose @ [[c, -s * ca, s * sa, a_i * c], [s, c * ca, -c * sa, a_i * s], [0, sa, ca, d_i], [0, 0, 0, 1]]
     return pose[:3, 3]
 
 

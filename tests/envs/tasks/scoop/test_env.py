@@ -88,11 +88,7 @@ def test_fidelity_changes_the_course_of_the_soil():
 
 def test_a_soil_of_ones_own_shapes_the_pile_and_is_dug():
     heavy = SoilParameters(
-        density_kg_m3=1700.0,
-        friction_angle_rad=0.7,
-        cohesion_pa=500.0,
-        swell=1.0,
-        steel_friction_angle_rad=0.4,
+        density_kg_m3=1700.0, friction_angle_rad=0.7, cohesion_pa=500.0, swell=1.0, steel_friction_angle_rad=0.4
     )
     env = ExcavatorEnv(soil=heavy, obs_type="agent_pos", episode_length=1)
     env.reset(seed=2)
