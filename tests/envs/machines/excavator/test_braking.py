@@ -11,6 +11,8 @@ from lerobot_excav.envs.machines.excavator.braking import (
     solved,
 )
 
+SEEDS = st.integers(0, 2**32 - 1)
+
 
 def random_inertia(rng, joints=4):
     """A mass matrix like the machine's: some tonnes times square metres, coupled."""
@@ -47,16 +49,16 @@ def relaxed(rows, limits, inertia, free):
     return velocity
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 6))
-@settings(max_examples=50, deadline=None)
+@given(SEEDS, st.integers(1, 6))
+@settings(max_examples=50)
 def test_solved_solves(seed, size):
     rng = np.random.default_rng(seed)
     matrix, right = random_inertia(rng, size), rng.normal(size=size)
     np.testing.assert_allclose(matrix @ solved(matrix, right), right, rtol=1e-8, atol=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+@settings(max_examples=30)
 def test_rows_give_the_speed_of_a_rigid_body(seed):
     rng = np.random.default_rng(seed)
     rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -64,7 +66,7 @@ def test_rows_give_the_speed_of_a_rigid_body(seed):
     jacobian, joint_vel = rng.normal(size=(6, 4)), rng.normal(size=4)
     linear, angular = np.split(jacobian @ joint_vel, 2)
     expected = [
-        (rotation @ axis.T).T @ (linear + np.cross(angular, rotation @ point))
+        axis @ rotation.T @ (linear + np.cross(angular, rotation @ point))
         for point, axis in zip(points, axes, strict=True)
     ]
     rows = patch_rows(jacobian, np.ascontiguousarray(rotation), points, axes)
@@ -99,8 +101,8 @@ def test_friction_holds_what_it_can_hold():
     assert abs((free + total / 100.0)[1]) < CREEP_SPEED_M_S
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
-@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.integers(1, 12))
+@settings(max_examples=40)
 def test_smooth_patches_give_what_relaxing_one_by_one_gives_in_the_end(seed, count):
     rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=False)
     total, _ = braking_impulse(rows, limits, frictions, inertia, free)
@@ -108,9 +110,9 @@ def test_smooth_patches_give_what_relaxing_one_by_one_gives_in_the_end(seed, cou
     np.testing.assert_allclose(found, relaxed(rows, limits, inertia, free), atol=1e-3)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 60))
-@settings(max_examples=150, deadline=None)
-def test_no_patches_drive_the_joints_or_reverse_a_point(seed, count):
+@given(SEEDS, st.integers(1, 60))
+@settings(max_examples=150)
+def test_no_patches_drive_the_joints_reverse_a_point_or_rub_more_than_they_can(seed, count):
     rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=True)
     total, impulses = braking_impulse(rows, limits, frictions, inertia, free)
     velocity = free + np.linalg.solve(inertia, total)
@@ -120,21 +122,13 @@ def test_no_patches_drive_the_joints_or_reverse_a_point(seed, count):
     assert energy[1] <= energy[0] * (1.0 + 1e-12)
     assert (impulses[:, 0] >= 0.0).all()
     assert (impulses[:, 0] <= limits * (1.0 + 1e-12)).all()
+    assert (np.linalg.norm(impulses[:, 1:], axis=1) <= frictions * limits * (1.0 + 1e-9)).all()
     assert (speeds[impulses[:, 0] > 1e-6 * limits, 0] <= 1e-7).all()
     np.testing.assert_allclose(np.einsum("kaj,ka->j", rows, impulses), total, rtol=1e-9, atol=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-@settings(max_examples=50, deadline=None)
-def test_friction_stays_within_its_coefficient_of_the_limit(seed, count):
-    rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=True)
-    _, impulses = braking_impulse(rows, limits, frictions, inertia, free)
-    rub = np.linalg.norm(impulses[:, 1:], axis=1)
-    assert (rub <= frictions * limits * (1.0 + 1e-9)).all()
-
-
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+@settings(max_examples=30)
 def test_the_order_of_the_patches_does_not_matter(seed):
     rng = np.random.default_rng(seed)
     rows, limits, frictions, inertia, free = random_case(rng, 20, friction=True)
