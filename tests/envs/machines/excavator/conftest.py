@@ -33,7 +33,7 @@ def machine():
 class SoilWithParcels(Soil):
     """A level soil with parcels at given points, all with one velocity."""
 
-    def __init__(self, positions=(), *, is_load=(), velocity=(0.0, 0.0, 0.0)):
+    def __init__(self, positions=(), *, is_load=False, velocity=(0.0, 0.0, 0.0)):
         super().__init__(container=TARGET_BOX)
         self._shown = np.array(positions, dtype=float).reshape(-1, 3)
         self._is_load = np.broadcast_to(np.array(is_load, dtype=bool), len(self._shown))
