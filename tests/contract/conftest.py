@@ -1,82 +1,73 @@
 """Every simulated robot on a stand-in environment: instant, and its state tells what happened to it."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from lerobot.robots import RobotConfig, make_robot_from_config
 
 import lerobot_excav.plugin  # noqa: F401 - registers every --robot.type
-from lerobot_excav.robots.simulated_robot import SimulatedRobot
 
-ROBOT_TYPES = sorted(
-    name for name, config in RobotConfig.get_known_choices().items() if config.__module__.startswith("lerobot_excav.")
-)
+ROBOTS = {
+    name: config
+    for name, config in RobotConfig.get_known_choices().items()
+    if config.__module__.startswith("lerobot_excav.")
+}
 
 
 class StandInEnv:
     """State: scene, target, number of steps since the reset."""
 
-    def __init__(self, robot: SimulatedRobot) -> None:
+    def __init__(self, robot):
         self._robot = robot
         self.is_closed = self.mask_missing = False
-        self.actions: list[np.ndarray] = []
+        self.actions = []
 
-    def reset(self, *, options: dict[str, int]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, *, options):
         self.state = np.zeros(len(self._robot.task_spec.state_names), np.float32)
         self.state[:2] = options["scene_id"], options["target_id"]
         self.target_id = options["target_id"]
         return self._observe(), self.info()
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action):
         self.state[2] += 1
         self.actions.append(action)
         return self._observe(), 0.0, False, False, self.info()
 
-    def info(self) -> dict[str, Any]:
+    def info(self):
         return {"target_id": self.target_id, "mask_missing": self.mask_missing}
 
-    def depth_m(self) -> np.ndarray:
+    def depth_m(self):
         return np.ones(self._robot.settings.observation_size, np.float32)
 
-    def close(self) -> None:
+    def close(self):
         self.is_closed = True
 
-    def _observe(self) -> dict[str, Any]:
-        config = self._robot.config
-        picture = (config.observation_height, config.observation_width, 3)
-        pixels = {camera: np.zeros(picture, np.uint8) for camera in self._robot.cameras}
-        return {"agent_pos": self.state.copy(), "pixels": pixels}
+    def _observe(self):
+        picture = np.zeros((*self._robot.settings.observation_size, 3), np.uint8)
+        return {"agent_pos": self.state.copy(), "pixels": {camera: picture.copy() for camera in self._robot.cameras}}
 
 
-@pytest.fixture(params=ROBOT_TYPES)
-def robot_type(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
+@pytest.fixture(params=sorted(ROBOTS))
+def robot_type(request):
+    return request.param
 
 
 @pytest.fixture
-def new_robot(robot_type: str, tmp_path: Path) -> Callable[..., SimulatedRobot]:
+def new_robot(robot_type, tmp_path):
     """Make a robot that is not connected, on its own environment; settings go to its configuration."""
 
-    def _new(**settings: Any) -> SimulatedRobot:
-        settings = {"session_log": tmp_path / "session.jsonl", "calibration_dir": tmp_path, **settings}
-        robot = make_robot_from_config(RobotConfig.get_choice_class(robot_type)(**settings))
-        assert isinstance(robot, SimulatedRobot)
-        return robot
+    def _new(**settings):
+        common = {"session_log": tmp_path / "session.jsonl", "calibration_dir": tmp_path}
+        return make_robot_from_config(ROBOTS[robot_type](**(common | settings)))
 
     return _new
 
 
 @pytest.fixture
-def make_robot(
-    new_robot: Callable[..., SimulatedRobot], monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., SimulatedRobot]]:
+def make_robot(new_robot, monkeypatch):
     """Make a robot connected to a stand-in environment; settings go to its configuration."""
     robots = []
 
-    def _make(**settings: Any) -> SimulatedRobot:
+    def _make(**settings):
         robot = new_robot(**settings)
         monkeypatch.setattr(type(robot), "make_env", lambda self: StandInEnv(self))
         robot.connect()
@@ -90,9 +81,8 @@ def make_robot(
 
 
 @pytest.fixture
-def still(new_robot: Callable[..., SimulatedRobot]) -> dict[str, float]:
+def still(new_robot):
     """Return an action well within the limits."""
-    robot = new_robot()
-    middle = 0.5 * (np.asarray(robot.task_spec.action_low) + np.asarray(robot.task_spec.action_high))
-    values = np.broadcast_to(middle.astype(np.float32), (len(robot.task_spec.action_names),))
-    return dict(zip(robot.task_spec.action_names, values.tolist(), strict=True))
+    spec = new_robot().task_spec
+    middle = 0.5 * (np.asarray(spec.action_low) + np.asarray(spec.action_high))
+    return dict(zip(spec.action_names, middle.astype(np.float32).tolist(), strict=True))

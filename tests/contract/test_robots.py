@@ -1,7 +1,6 @@
 """What every robot of this package does for LeRobot's commands, whatever machine it simulates."""
 
 import logging
-from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,19 +13,15 @@ from lerobot_excav.datasets.complete.session import read_session
 from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.errors import ConfigurationError, DeviceError
 from lerobot_excav.robots import live
-from lerobot_excav.robots.simulated_robot import SimulatedRobot
-
-MakeRobot = Callable[..., SimulatedRobot]
-Action = dict[str, float]
 
 
-def where(robot: SimulatedRobot) -> tuple[int, ...]:
+def where(robot):
     """Return scene, target and number of steps, as the stand-in environment saw them."""
     observation = robot.get_observation()
     return tuple(int(observation[name]) for name in robot.task_spec.state_names[:3])
 
 
-def test_features_are_known_before_connecting(new_robot: MakeRobot) -> None:
+def test_features_are_known_before_connecting(new_robot):
     robot = new_robot(observation_height=64, observation_width=80)
     features, scalars = robot.observation_features, len(robot.task_spec.state_names)
     assert dict(list(features.items())[:scalars]) == dict.fromkeys(robot.task_spec.state_names, float)
@@ -34,18 +29,14 @@ def test_features_are_known_before_connecting(new_robot: MakeRobot) -> None:
     assert robot.action_features == dict.fromkeys(robot.task_spec.action_names, float)
     assert len(robot.cameras) == 3
     assert {"main", "target_mask"} < set(robot.cameras)
+    # lerobot-rollout drops every scalar of another name.
+    scalars = (*robot.task_spec.state_names, *robot.task_spec.action_names)
+    assert all(name.endswith((".pos", ".vel")) for name in scalars)
     assert not robot.is_connected
     assert robot.is_calibrated
 
 
-def test_rollout_keeps_every_scalar(new_robot: MakeRobot) -> None:
-    robot = new_robot()
-    assert all(
-        name.endswith((".pos", ".vel")) for name in (*robot.task_spec.state_names, *robot.task_spec.action_names)
-    )
-
-
-def test_observations_match_the_features(make_robot: MakeRobot) -> None:
+def test_observations_match_the_features(make_robot):
     robot = make_robot()
     observation = robot.get_observation()
     assert list(observation) == list(robot.observation_features)
@@ -55,19 +46,11 @@ def test_observations_match_the_features(make_robot: MakeRobot) -> None:
         else:
             assert observation[name].shape == feature
             assert observation[name].dtype == np.uint8
-
-
-def test_an_observation_can_be_changed_without_harm(make_robot: MakeRobot) -> None:
-    robot = make_robot()
-    robot.get_observation()["main"][:] = 7
+    observation["main"][:] = 7  # does no harm
     assert not robot.get_observation()["main"].any()
 
 
-def test_the_first_scene_and_target_are_the_configured_ones(make_robot: MakeRobot) -> None:
-    assert where(make_robot(scene_id=5, target_id=2)) == (5, 2, 0)
-
-
-def test_each_action_is_one_frame_and_is_clipped(make_robot: MakeRobot, still: Action) -> None:
+def test_each_action_is_one_frame_and_is_clipped(make_robot, still):
     robot = make_robot()
     assert robot.send_action(still) == still
     sent = robot.send_action(dict.fromkeys(still, 1e6))
@@ -77,23 +60,20 @@ def test_each_action_is_one_frame_and_is_clipped(make_robot: MakeRobot, still: A
     assert np.allclose(robot.env.actions[-1], highest)
     assert robot.env.actions[-1].dtype == np.float32
     assert list(sent.values()) == robot.env.actions[-1].tolist()
-
-
-def test_a_recorded_action_comes_as_tensors_of_no_dimension(make_robot: MakeRobot, still: Action) -> None:
-    robot = make_robot()
+    # A recorded action comes as tensors of no dimension.
     robot.send_action({name: torch.tensor(value) for name, value in still.items()})
     assert robot.env.actions[-1].tolist() == list(still.values())
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_an_action_that_is_not_finite_is_refused(make_robot: MakeRobot, still: Action, value: float) -> None:
+def test_an_action_that_is_not_finite_is_refused(make_robot, still, value):
     robot = make_robot()
     with pytest.raises(DeviceError, match="is not finite; check the device or the policy"):
         robot.send_action(still | {robot.task_spec.action_names[2]: value})
     assert where(robot) == (0, 0, 0)
 
 
-def test_an_incomplete_action_is_refused(make_robot: MakeRobot, still: Action) -> None:
+def test_an_incomplete_action_is_refused(make_robot, still):
     robot = make_robot()
     *others, last = still
     for action, message in (
@@ -106,7 +86,7 @@ def test_an_incomplete_action_is_refused(make_robot: MakeRobot, still: Action) -
     assert where(robot) == (0, 0, 0)
 
 
-def test_a_robot_out_of_turn_says_so(new_robot: MakeRobot, make_robot: MakeRobot, still: Action) -> None:
+def test_a_robot_out_of_turn_says_so(new_robot, make_robot, still):
     robot = new_robot()
     for use in (robot.get_observation, robot.disconnect, lambda: robot.send_action(still)):
         with pytest.raises(DeviceError, match=rf"{robot.name} is not connected; call connect\(\)"):
@@ -115,7 +95,7 @@ def test_a_robot_out_of_turn_says_so(new_robot: MakeRobot, make_robot: MakeRobot
         make_robot().connect()
 
 
-def test_disconnecting_frees_the_simulation(make_robot: MakeRobot) -> None:
+def test_disconnecting_frees_the_simulation(make_robot):
     robot = make_robot()
     env = robot.env
     robot.disconnect()
@@ -123,33 +103,19 @@ def test_disconnecting_frees_the_simulation(make_robot: MakeRobot) -> None:
     assert not robot.is_connected
 
 
-def test_reinitialise_starts_the_same_scene_again(make_robot: MakeRobot, still: Action) -> None:
-    robot = make_robot(scene_id=2)
-    robot.send_action(still)
-    robot.send_action(still | {"reinitialise": 1.0})
-    assert where(robot) == (2, 0, 0)
-
-
-def test_next_scene_goes_through_the_targets_then_the_scenes(make_robot: MakeRobot, still: Action) -> None:
+def test_scenes_are_repeated_or_followed_target_by_target_and_each_start_is_an_episode(make_robot, still):
     robot = make_robot(scene_id=2, target_id=2)
-    visited = []
-    for _ in range(3):
-        robot.send_action(still | {"next_scene": 1.0})
-        visited.append(where(robot))
-    assert visited == [(2, 3, 0), (3, 0, 0), (3, 1, 0)]
-
-
-def test_every_restart_counts_as_an_episode(make_robot: MakeRobot, still: Action) -> None:
-    robot = make_robot()
-    episodes = [robot.episode_count]
-    for key in ("reinitialise", "next_scene"):
+    visited, episodes = [where(robot)], [robot.episode_count]
+    for key in ("reinitialise", "next_scene", "next_scene", "next_scene"):
         robot.send_action(still)
         robot.send_action(still | {key: 1.0})
+        visited.append(where(robot))
         episodes.append(robot.episode_count)
-    assert np.diff(episodes).tolist() == [1, 1]
+    assert visited == [(2, 2, 0), (2, 2, 0), (2, 3, 0), (3, 0, 0), (3, 1, 0)]
+    assert np.diff(episodes).tolist() == [1] * 4
 
 
-def test_a_rollout_can_drive_it_home(make_robot: MakeRobot, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_rollout_can_drive_it_home(make_robot, caplog):
     robot = make_robot()
     positions = {name: value for name, value in robot.get_observation().items() if name.endswith(".pos")}
     hardware = SimpleNamespace(robot_wrapper=ThreadSafeRobot(robot), initial_position=positions)
@@ -158,33 +124,22 @@ def test_a_rollout_can_drive_it_home(make_robot: MakeRobot, caplog: pytest.LogCa
     assert "Could not return" not in caplog.text
 
 
-def begin_episode(number: int) -> None:
-    """Say what lerobot-record says when it begins to record."""
-    level = logging.getLogger().level
-    logging.getLogger().setLevel(logging.NOTSET)
-    logging.info(f"Recording episode {number}")
-    logging.getLogger().setLevel(level)
-
-
-def test_positions_alone_restart_the_scene_once_where_the_machine_takes_none(
-    make_robot: MakeRobot, still: Action
-) -> None:
+def test_positions_alone_restart_the_scene_once_where_the_machine_takes_none(make_robot, still):
     robot = make_robot()
     home = {name: 0.0 for name in robot.task_spec.state_names if name.endswith(".pos")}
     takes_positions = set(home) <= set(still)
-    robot.send_action(still)
     resets = robot.episode_count
-    for _ in range(3):
-        robot.send_action(home)
-    assert robot.episode_count == resets + (not takes_positions)
-    robot.send_action(still)
-    robot.send_action(home)
+    for _ in range(2):
+        robot.send_action(still)
+        for _ in range(3):
+            robot.send_action(home)
     assert robot.episode_count == resets + 2 * (not takes_positions)
 
 
-def test_the_session_log_tells_settings_and_commands(make_robot: MakeRobot, still: Action) -> None:
+def test_the_session_log_tells_settings_and_commands(make_robot, still, caplog):
     robot = make_robot(mask_noise="dilate", mask_noise_px=2, target_id=1)
-    begin_episode(0)
+    with caplog.at_level(logging.INFO):
+        logging.info("Recording episode 0")  # as lerobot-record says when it begins
     for target_id in (1, 1, 3, 3):
         robot.env.target_id = target_id
         robot.send_action(still)
@@ -197,7 +152,7 @@ def test_the_session_log_tells_settings_and_commands(make_robot: MakeRobot, stil
     assert episode.simulation_version == robot.task_spec.simulation_version
 
 
-def test_a_robot_without_a_mask_is_not_driven(make_robot: MakeRobot, still: Action) -> None:
+def test_a_robot_without_a_mask_is_not_driven(make_robot, still):
     robot = make_robot(target_id=1)
     robot.env.mask_missing = True
     for use in (lambda: robot.send_action(still), robot.start_scene):
@@ -205,13 +160,13 @@ def test_a_robot_without_a_mask_is_not_driven(make_robot: MakeRobot, still: Acti
             use()
 
 
-def test_depth_is_offered_on_request_only(make_robot: MakeRobot) -> None:
+def test_depth_is_offered_on_request_only(make_robot):
     assert make_robot(depth=True).depth_m().shape == (96, 128)
     with pytest.raises(DeviceError, match=r"--robot\.depth=true"):
         make_robot().depth_m()
 
 
-def test_the_connected_robot_can_be_found(make_robot: MakeRobot, robot_type: str) -> None:
+def test_the_connected_robot_can_be_found(make_robot, robot_type):
     with pytest.raises(DeviceError, match=f"0 robots of type {robot_type}.*--robot.type={robot_type}"):
         live.connected_robot(robot_type)
     robot = make_robot()
@@ -239,9 +194,7 @@ def test_the_connected_robot_can_be_found(make_robot: MakeRobot, robot_type: str
         ("advance", "never", "episode, button"),
     ],
 )
-def test_an_impossible_value_is_named_with_what_is_allowed(
-    new_robot: MakeRobot, field: str, value: object, allowed: str
-) -> None:
+def test_an_impossible_value_is_named_with_what_is_allowed(new_robot, field, value, allowed):
     with pytest.raises(ConfigurationError) as raised:
         new_robot(**{field: value})
     assert f"robot.{field}={value!r}" in str(raised.value)

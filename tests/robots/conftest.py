@@ -2,37 +2,24 @@
 
 import logging
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
-RunCommand = Callable[..., None]
-
 
 @pytest.fixture
-def logging_is_restored() -> Iterator[None]:
-    """LeRobot's commands replace the handlers of the root logger."""
+def run_command(monkeypatch, tmp_path):
+    """Run a command on the dataset `data`, with the session log `session.jsonl`."""
     root = logging.getLogger()
     level, handlers = root.level, list(root.handlers)
-    yield
-    root.setLevel(level)
-    root.handlers[:] = handlers
 
-
-@pytest.fixture
-def run_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, logging_is_restored: None) -> RunCommand:
-    """Run a command on the dataset `data`, with the session log `session.jsonl`."""
-
-    def _run(main: Callable[[], None], *arguments: str) -> None:
-        common = [
-            f"--robot.calibration_dir={tmp_path}",
-            f"--robot.session_log={tmp_path / 'session.jsonl'}",
-            "--dataset.repo_id=someone/data",
-            f"--dataset.root={tmp_path / 'data'}",
-            "--play_sounds=false",
-        ]
-        monkeypatch.setattr(sys, "argv", ["command", *common, *arguments])
+    def _run(main, *arguments):
+        log, data = tmp_path / "session.jsonl", tmp_path / "data"
+        robot = (f"--robot.calibration_dir={tmp_path}", f"--robot.session_log={log}", "--play_sounds=false")
+        dataset = ("--dataset.repo_id=someone/data", f"--dataset.root={data}")
+        monkeypatch.setattr(sys, "argv", ["command", *robot, *dataset, *arguments])
         main()
 
-    return _run
+    yield _run
+    # LeRobot's commands replace the handlers of the root logger.
+    root.setLevel(level)
+    root.handlers[:] = handlers

@@ -1,7 +1,6 @@
 """Where a session is logged, and what happens where it cannot be."""
 
 from datetime import datetime
-from pathlib import Path
 
 import pytest
 
@@ -10,12 +9,12 @@ from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.session_log import SessionLog, default_path
 
 
-def test_by_default_the_log_is_where_lerobot_puts_its_outputs() -> None:
+def test_by_default_the_log_is_where_lerobot_puts_its_outputs():
     path = default_path("excavator_sim_sessions", datetime(2026, 1, 2, 3, 4, 5))
     assert path.as_posix() == "outputs/excavator_sim_sessions/2026-01-02_03-04-05.jsonl"
 
 
-def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+def test_a_log_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     log = SessionLog(tmp_path / "file" / "session.jsonl", SCOOP, SCOOP.make_settings())
     log.begin(0, scene_id=0, target_id=0)

@@ -72,17 +72,12 @@ def test_every_pixel_of_a_geom_lies_on_it(pictures):
     assert np.isin(geoms, [FLOOR, BOX, -1]).all()
 
 
-def test_naming_geoms_leaves_colours_as_they_were(pictures):
-    before = pictures.colour("above", EVERYTHING)
-    pictures.geoms("above", EVERYTHING)
-    np.testing.assert_array_equal(pictures.colour("above", EVERYTHING), before)
-
-
-def test_pictures_are_copies(pictures):
+def test_pictures_are_copies_and_naming_geoms_leaves_colours_as_they_were(pictures):
     first = pictures.colour("above", EVERYTHING)
     kept = first.copy()
-    pictures.colour("aside", EVERYTHING)
+    pictures.geoms("aside", EVERYTHING)
     np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(pictures.colour("above", EVERYTHING), kept)
 
 
 def test_context_is_made_with_the_first_picture_and_freed_by_close(pictures):

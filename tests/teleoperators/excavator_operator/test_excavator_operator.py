@@ -1,7 +1,5 @@
 """What only the excavator's scripted operator does; what it shares with others is in tests/contract."""
 
-from pathlib import Path
-
 import numpy as np
 
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
@@ -12,23 +10,20 @@ from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator im
 from lerobot_excav.teleoperators.excavator_operator.excavator_operator import ExcavatorOperator
 
 
-def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path: Path) -> None:
+def test_it_acts_as_the_scripted_operator_in_the_environment(tmp_path):
     operator = ExcavatorOperator(ExcavatorOperatorConfig(calibration_dir=tmp_path, seed=3))
     operator.connect()
-    size = {"observation_height": 32, "observation_width": 32}
-    robot = ExcavatorSim(ExcavatorSimConfig(calibration_dir=tmp_path, scene_id=1, target_id=2, **size))
-    with robot:
-        driven = []
-        for _ in range(25):
-            driven.append(list(operator.get_action().values()))
-            robot.send_action(dict(zip(robot.task_spec.action_names, driven[-1], strict=True)))
     env = ExcavatorEnv(obs_type="agent_pos")
     env.reset(options={"scene_id": 1, "target_id": 2})
     script = DigOperator(rng=np.random.default_rng((3, 1, 2)))
     script.reset(env)
-    expected = []
-    for _ in range(25):
-        expected.append(script.act(env).tolist())
-        env.step(np.array(expected[-1], np.float32))
-    assert driven == expected
+    size = {"observation_height": 32, "observation_width": 32}
+    driven = []
+    with ExcavatorSim(ExcavatorSimConfig(calibration_dir=tmp_path, scene_id=1, target_id=2, **size)) as robot:
+        for _ in range(25):
+            action, expected = operator.get_action(), script.act(env)
+            driven.append(list(action.values()))
+            assert driven[-1] == expected.tolist()
+            robot.send_action(action)
+            env.step(expected)
     assert np.abs(driven).max() > 0.1

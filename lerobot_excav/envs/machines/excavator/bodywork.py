@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -95,7 +96,7 @@ def dress_arm(body: mujoco.MjsBody) -> None:
 
 def dress_bucket(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     """Build the bucket from plates along its profile, two cheeks, hinge ears and four teeth."""
-    half_plate = const.PLATE_THICKNESS_M / 2
+    half_plate = PLATE_THICKNESS_M / 2
     half_width = const.BUCKET_INNER_WIDTH_M / 2
     points = [np.array(p) for p in const.BUCKET_PROFILE_T]
     for i, (start, end) in enumerate(pairwise(points)):
@@ -177,7 +178,7 @@ def _beam(
 
 def _add_cheek(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, y: float) -> None:
     """Add a side plate: the convex profile, extruded by the plate's thickness."""
-    half_plate = const.PLATE_THICKNESS_M / 2
+    half_plate = PLATE_THICKNESS_M / 2
     points = [(x, side * half_plate, z) for side in (-1.0, 1.0) for x, z in const.BUCKET_PROFILE_T]
     mesh = spec.add_mesh(
         name=name, uservert=np.array(points).ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX

@@ -156,13 +156,7 @@ def _rise(speeds: Array, changes: Array, share: float, limits: Array, grips: Arr
 def _lowest_share(speeds: Array, changes: Array, limits: Array, grips: Array, slope: float, curvature: float) -> float:
     """Return the share in (0, 1] of a step at which the function is lowest along it.
 
-    Args:
-        speeds: (k, 3) before the step [m/s].
-        changes: (k, 3) by the whole step [m/s].
-        limits: (k,) [N s].
-        grips: (k,) [N s].
-        slope: Derivative of the inertial part along the step at its start.
-        curvature: Its second derivative.
+    `changes` are those of the speeds by the whole step; slope and curvature are those of the inertial part along it.
     """
     flat = _FLATNESS * abs(slope + _rise(speeds, changes, 0.0, limits, grips))
     if slope + curvature + _rise(speeds, changes, 1.0, limits, grips) <= flat:

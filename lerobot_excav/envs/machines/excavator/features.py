@@ -3,12 +3,12 @@
 Each scalar ends in `.pos` or `.vel`: `lerobot-rollout` drops every other name without a word.
 """
 
-JOINTS = ("swing", "boom", "arm", "bucket")
+from lerobot_excav.envs.machines.excavator.constants import JOINT_NAMES
 
-ACTION_NAMES = tuple(f"{joint}.vel" for joint in JOINTS)
+ACTION_NAMES = tuple(f"{joint}.vel" for joint in JOINT_NAMES)
 """Joystick commands in [-1, 1], in the order of the environment's action."""
 
-STATE_NAMES = (*(f"{joint}.pos" for joint in JOINTS), *ACTION_NAMES)
+STATE_NAMES = (*(f"{joint}.pos" for joint in JOINT_NAMES), *ACTION_NAMES)
 """Joint positions [rad] and velocities [rad/s], in the order of `agent_pos`."""
 
 CAMERAS = ("main", "cab", "target_mask")

@@ -58,7 +58,9 @@ def inverse(radius_m: float, height_m: float, pitch_rad: float, swing_rad: float
     boom = _wrapped(boom)
     bucket = _in_range(pitch_rad - boom - arm, const.JOINT_RANGE_RAD[3])
     joint_pos = np.array([swing_rad, boom, arm, bucket])
-    return joint_pos if _within_limits(joint_pos) else None
+    lower, upper = np.array(const.JOINT_RANGE_RAD).T
+    outside = np.maximum(lower - joint_pos, joint_pos - upper)
+    return joint_pos if np.all(outside <= _LIMIT_TOLERANCE_RAD) else None
 
 
 def _wrapped(angle: float) -> float:
@@ -69,8 +71,3 @@ def _in_range(angle: float, limits: tuple[float, float]) -> float:
     """Shift an angle by whole turns to within half a turn of the middle of its range."""
     middle = 0.5 * (limits[0] + limits[1])
     return middle + _wrapped(angle - middle)
-
-
-def _within_limits(joint_pos: NDArray[np.float64]) -> bool:
-    lower, upper = np.array(const.JOINT_RANGE_RAD).T
-    return bool(np.all(joint_pos >= lower - _LIMIT_TOLERANCE_RAD) and np.all(joint_pos <= upper + _LIMIT_TOLERANCE_RAD))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator import surfaces
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
+from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
 
 LOAD_SKIN = "load"
 
@@ -96,7 +97,7 @@ def _shell_depth(x_t: NDArray[np.float64]) -> NDArray[np.float64]:
     profile = np.array(const.BUCKET_PROFILE_T)
     bottom = profile[: int(np.argmin(profile[:, 0]))]
     depth = np.interp(x_t, bottom[::-1, 0], bottom[::-1, 1])
-    return np.asarray(depth + 0.5 * const.PLATE_THICKNESS_M)
+    return np.asarray(depth + 0.5 * PLATE_THICKNESS_M)
 
 
 def _smooth(heights: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.control import RateControl, checked_action
 from lerobot_excav.envs.machines.excavator.digging import JointResistance
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
 from lerobot_excav.envs.soil.container import Container
@@ -19,11 +20,7 @@ SUBSTEPS = round(const.TICK_S / const.SUBSTEP_S)
 if abs(SUBSTEPS * const.SUBSTEP_S - const.TICK_S) > 1e-6:
     raise ConfigurationError(f"SUBSTEP_S={const.SUBSTEP_S} does not divide TICK_S={const.TICK_S}")
 
-_DIVERGENCE = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-)
+_DIVERGENCE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 class ExcavatorMachine:
@@ -31,26 +28,16 @@ class ExcavatorMachine:
 
     Args:
         container: Target box that stands beside the machine.
-        terrain_shape_m: Size of the dig area along x and y [m], centred on the world origin; pictures only.
-        appearance: Colours and light; the defaults without it.
 
     Attributes:
         model: The compiled MuJoCo model.
         data: Its state.
         container: The target box.
-        terrain_shape_m: As given.
     """
 
-    def __init__(
-        self,
-        *,
-        container: Container,
-        terrain_shape_m: tuple[float, float] = (6.0, 6.0),
-        appearance: Appearance | None = None,
-    ) -> None:
+    def __init__(self, *, container: Container = TARGET_BOX) -> None:
         self.container = container
-        self.terrain_shape_m = terrain_shape_m
-        self.model = build_spec(container, terrain_shape_m).compile()
+        self.model = build_spec(container).compile()
         self.data = mujoco.MjData(self.model)
         self._control = RateControl()
         self._resistance = JointResistance(self.model)
@@ -60,7 +47,7 @@ class ExcavatorMachine:
         self._edge_site = self.model.site("cutting_edge").id
         self._is_box_geom = self.model.geom_bodyid == self.model.body("box").id
         self._box_contact_force_n = 0.0
-        self.set_appearance(appearance or Appearance())
+        self.set_appearance(Appearance())
         self.reset(np.array([0.0, 0.5, -1.8, -0.6]))
 
     def reset(self, joint_pos: NDArray[np.float64]) -> None:

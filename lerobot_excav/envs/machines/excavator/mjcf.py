@@ -13,6 +13,7 @@ from lerobot_excav.envs.machines.excavator.bodywork import (
     WORKING_BIT,
 )
 from lerobot_excav.envs.machines.excavator.grains import add_grains
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.load_picture import add_load
 from lerobot_excav.envs.soil.container import Container
 
@@ -23,12 +24,11 @@ _AXIS_UP = (0.0, 0.0, 1.0)
 _AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift
 
 
-def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mujoco.MjSpec:
+def build_spec(container: Container = TARGET_BOX) -> mujoco.MjSpec:
     """Assemble the model.
 
     Args:
         container: Target box; the world frame is that of the soil.
-        terrain_shape_m: Size of the dig area along x and y [m], centred on the world origin.
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
@@ -42,8 +42,7 @@ def build_spec(container: Container, terrain_shape_m: tuple[float, float]) -> mu
     _add_ground(spec)
     _add_box(spec, container)
     _add_machine(spec)
-    surfaces.add_terrain(spec, terrain_shape_m)
-    surfaces.add_box_soil(spec, container)
+    surfaces.add_soil(spec, container)
     add_load(spec)
     add_grains(spec)
     return spec
@@ -104,11 +103,8 @@ def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
     half_x, half_y = container.half_extent_m
     thickness, height = const.BOX_WALL_THICKNESS_M, container.wall_height_m
     yaw = container.yaw_rad
-    body = spec.worldbody.add_body(
-        name="box",
-        pos=list(container.center_w),
-        quat=[np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)],
-    )
+    quat = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+    body = spec.worldbody.add_body(name="box", pos=list(container.center_w), quat=quat)
     outer_x = half_x + thickness
     panels = {
         "box_floor": ((0.0, 0.0, -0.005), (half_x, half_y, 0.005)),
@@ -133,7 +129,7 @@ def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
 
 
 def _add_machine(spec: mujoco.MjSpec) -> None:
-    carrier = _add_body(spec.worldbody, "undercarriage", const.MACHINE_POS_W)
+    carrier = spec.worldbody.add_body(name="undercarriage", pos=const.MACHINE_POS_W)
     carrier.mass, carrier.inertia = const.UNDERCARRIAGE_MASS_KG, [1.0, 1.0, 1.0]
     carrier.explicitinertial = True
     house = _add_link(
@@ -174,7 +170,7 @@ def _add_link(
     inertia_kgm2: tuple[float, float, float],
 ) -> mujoco.MjsBody:
     """Add a body with its joint and its position servo."""
-    body = _add_body(parent, _LINK_NAMES[joint], pos)
+    body = parent.add_body(name=_LINK_NAMES[joint], pos=pos)
     body.mass, body.ipos, body.inertia = mass_kg, list(com), list(inertia_kgm2)
     body.explicitinertial = True
     # The hydraulics carry the links' own weight. The share of each joint counts as actuator torque (actgravcomp)
@@ -196,10 +192,6 @@ def _add_link(
     actuator.set_to_position(kp=stiffness, kv=damping)
     actuator.forcelimited, actuator.forcerange = True, [-torque, torque]
     return body
-
-
-def _add_body(parent: mujoco.MjsBody, name: str, pos: tuple[float, float, float]) -> mujoco.MjsBody:
-    return parent.add_body(name=name, pos=list(pos))
 
 
 def _add_payload(bucket: mujoco.MjsBody) -> None:

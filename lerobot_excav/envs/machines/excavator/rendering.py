@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
@@ -64,7 +65,7 @@ class WorksiteRenderer:
         """
         self._soil_picture.update(self._worksite.soil)
         points_w = self._pictures.points_w("main", self._without_machine)
-        half_x, half_y = 0.5 * np.asarray(self._worksite.machine.terrain_shape_m)
+        half_x, half_y = 0.5 * np.asarray(DIG_AREA_EXTENT_M)
         inside = (np.abs(points_w[..., 0]) <= half_x) & (np.abs(points_w[..., 1]) <= half_y)
         points_w[~inside] = np.nan
         return points_w

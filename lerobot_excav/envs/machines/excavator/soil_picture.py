@@ -29,7 +29,7 @@ class SoilPicture:
     def __init__(self, machine: ExcavatorMachine) -> None:
         self._model: mujoco.MjModel = machine.model
         self._machine = machine
-        self._terrain_grid = surfaces.terrain_grid(machine.terrain_shape_m)
+        self._terrain_grid = surfaces.terrain_grid()
         self._box_grid = surfaces.box_grid(machine.container)
         self._grains = Grains(machine.model)
         self._load = LoadPicture(machine.model)

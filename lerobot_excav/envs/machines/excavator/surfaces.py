@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.bodywork import SURROUNDINGS_GROUP
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
 from lerobot_excav.envs.soil.container import Container
 
 TERRAIN_SKIN = "terrain"
 BOX_SOIL_SKIN = "box_soil"
-_TERRAIN_SPACING_M = 0.1
-_BOX_SOIL_SPACING_M = 0.1
+_SPACING_M = 0.1
 _SKIRT_DEPTH_M = 0.05
 _GRAIN_GLOW = 0.25  # tuned by eye
 _TEXTURE_PIXELS = 128
@@ -23,32 +23,26 @@ _TEXTURE_PERIOD_M = 2.0
 _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
 
 
-def add_terrain(spec: mujoco.MjSpec, shape_m: tuple[float, float]) -> None:
-    """Add the skin of the dig area, centred on the world origin."""
+def add_soil(spec: mujoco.MjSpec, container: Container) -> None:
+    """Add the skins of the dig area and of the soil in the target box, the latter in the frame of the box."""
     _add_soil_materials(spec)
-    add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(shape_m), SURROUNDINGS_GROUP)
-
-
-def add_box_soil(spec: mujoco.MjSpec, container: Container) -> None:
-    """Add the skin of the soil in the target box, in the frame of the box."""
+    add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(), SURROUNDINGS_GROUP)
     add_sheet(spec, BOX_SOIL_SKIN, "box", box_grid(container), SURROUNDINGS_GROUP)
 
 
-def terrain_grid(shape_m: tuple[float, float]) -> NDArray[np.float64]:
+def terrain_grid() -> NDArray[np.float64]:
     """Return the vertices of the terrain picture on the ground plane, shape (nx, ny, 2) [m]."""
-    return _grid(shape_m, _TERRAIN_SPACING_M)
+    return _grid(DIG_AREA_EXTENT_M)
 
 
 def box_grid(container: Container) -> NDArray[np.float64]:
     """Return the vertices of the picture of the soil in the box, box frame, shape (nx, ny, 2) [m]."""
     half_x, half_y = container.half_extent_m
-    return _grid((2 * half_x, 2 * half_y), _BOX_SOIL_SPACING_M)
+    return _grid((2 * half_x, 2 * half_y))
 
 
 def skin_vertices(
-    grid: NDArray[np.float64],
-    heights_m: NDArray[np.float64],
-    foot_m: float | NDArray[np.float64] = -_SKIRT_DEPTH_M,
+    grid: NDArray[np.float64], heights_m: NDArray[np.float64], foot_m: float | NDArray[np.float64] = -_SKIRT_DEPTH_M
 ) -> NDArray[np.float32]:
     """Return the vertices of a soil skin: the surface, then a skirt that closes its border downwards.
 
@@ -73,8 +67,8 @@ def write_skin(model: mujoco.MjModel, name: str, vertices: NDArray[np.float32]) 
     model.skin_vert[start : start + len(vertices)] = vertices
 
 
-def _grid(shape_m: tuple[float, float], spacing_m: float) -> NDArray[np.float64]:
-    counts = [max(2, round(size / spacing_m) + 1) for size in shape_m]
+def _grid(shape_m: tuple[float, float]) -> NDArray[np.float64]:
+    counts = [max(2, round(size / _SPACING_M) + 1) for size in shape_m]
     x, y = (np.linspace(-size / 2, size / 2, n) for size, n in zip(shape_m, counts, strict=True))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 

@@ -37,12 +37,10 @@ class Worksite:
     Attributes:
         machine: The excavator.
         soil: The soil, with the box.
-        time_s: Time since the reset.
-        reaction: What the soil did to the bucket in the last tick; None before the first one.
     """
 
     def __init__(self, *, soil: str | SoilParameters = "sand", fidelity: str = "standard") -> None:
-        self.machine = ExcavatorMachine(container=TARGET_BOX, terrain_shape_m=DIG_AREA_EXTENT_M)
+        self.machine = ExcavatorMachine()
         self.soil = Soil(
             preset=soil,
             extent_m=DIG_AREA_EXTENT_M,
@@ -50,8 +48,6 @@ class Worksite:
             fidelity=fidelity,
             container=TARGET_BOX,
         )
-        self.time_s = 0.0
-        self.reaction: Reaction | None = None
         self._ticks = 0
 
     def reset(self, start: WorksiteStart) -> None:
@@ -59,8 +55,7 @@ class Worksite:
         self.machine.set_appearance(start.appearance)
         self.machine.reset(start.joint_pos)
         self.soil.reset(start.heights_m)
-        self._ticks, self.time_s = 0, 0.0
-        self.reaction = None
+        self._ticks = 0
 
     def tick(self, action: NDArray[np.float64]) -> Reaction:
         """Advance by `TICK_S` under joystick commands.
@@ -73,10 +68,13 @@ class Worksite:
         """
         reaction = self.soil.step(TICK_S, self.machine.tool())
         self.machine.tick(action, reaction)
-        self.reaction = reaction
         self._ticks += 1
-        self.time_s = self._ticks * TICK_S
         return reaction
+
+    @property
+    def time_s(self) -> float:
+        """Time since the reset [s]."""
+        return self._ticks * TICK_S
 
     @property
     def tool(self) -> Tool:

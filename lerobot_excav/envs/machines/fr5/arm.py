@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.fr5 import constants as const
-from lerobot_excav.envs.machines.fr5.geoms import ARM, DECORATION, Kind
+from lerobot_excav.envs.machines.fr5.geoms import ARM, DECORATION
 
 _SHELL_RGBA = (0.92, 0.93, 0.94, 1.0)
 _JOINT_RGBA = (0.30, 0.33, 0.38, 1.0)
@@ -66,28 +66,11 @@ def _add_link(parent: mujoco.MjsBody, i: int, name: str) -> mujoco.MjsBody:
         actfrcrange=[-torque, torque],
     )
     for start, end, radius, rgba, kind in _LINK_SHAPES[i]:
-        _add_capsule(link, start, end, radius, rgba, kind)
+        link.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*start, *end], size=[radius, 0, 0], rgba=rgba, mass=0,
+            **kind.arguments,
+        )  # fmt: skip
     return link
-
-
-def _add_capsule(
-    body: mujoco.MjsBody,
-    start: tuple[float, float, float],
-    end: tuple[float, float, float],
-    radius: float,
-    rgba: tuple[float, ...],
-    kind: Kind,
-) -> None:
-    body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-        fromto=[*start, *end],
-        size=[radius, 0, 0],
-        rgba=rgba,
-        contype=kind.type,
-        conaffinity=kind.affinity,
-        group=kind.group,
-        mass=0,
-    )
 
 
 def _add_servo(spec: mujoco.MjSpec, i: int, name: str) -> None:

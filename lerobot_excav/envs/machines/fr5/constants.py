@@ -43,9 +43,7 @@ JOINT_PLACEMENTS = (
 FLANGE_OFFSET_M = 0.100
 """Flange along the z axis of the last joint [m] (DH d6; kind: datasheet)."""
 
-JOINT_LIMITS_RAD = np.radians(
-    [[-175, 175], [-265, 85], [-160, 160], [-265, 85], [-175, 175], [-175, 175]],
-)
+JOINT_LIMITS_RAD = np.radians([[-175, 175], [-265, 85], [-160, 160], [-265, 85], [-175, 175], [-175, 175]])
 """Lower and upper limit per joint [rad], (6, 2) (kind: datasheet; of 160 and 162 deg for joint 3 the smaller)."""
 JOINT_SPEED_RAD_S = np.array([3.15, 3.15, 3.15, 3.2, 3.2, 3.2])
 """Speed limit per joint [rad/s] (kind: datasheet)."""

@@ -10,6 +10,11 @@ class Kind(NamedTuple):
     affinity: int
     group: int
 
+    @property
+    def arguments(self) -> dict[str, int]:
+        """The arguments of `add_geom` that say so."""
+        return {"contype": self.type, "conaffinity": self.affinity, "group": self.group}
+
 
 _CELL_BIT, _ARM_BIT = 1, 2
 

@@ -3,7 +3,7 @@
 import mujoco
 
 from lerobot_excav.envs.machines.fr5 import constants as const
-from lerobot_excav.envs.machines.fr5.geoms import ARM, HARD_SOLREF, Kind
+from lerobot_excav.envs.machines.fr5.geoms import ARM, HARD_SOLREF
 
 _HAND_RGBA = (0.16, 0.17, 0.19, 1.0)
 _PAD_RGBA = (0.05, 0.05, 0.06, 1.0)
@@ -24,7 +24,7 @@ def add_gripper(spec: mujoco.MjSpec, wrist: mujoco.MjsBody) -> None:
         size=[const.HAND_RADIUS_M, 0, 0],
         mass=const.HAND_MASS_KG,
         rgba=_HAND_RGBA,
-        **_collision(ARM),
+        **ARM.arguments,
     )
     hand.add_site(name="grasp", pos=[0.0, 0.0, const.PAD_CENTRE_M], group=5)
     for finger, side in enumerate((1.0, -1.0)):
@@ -57,7 +57,7 @@ def _add_finger(hand: mujoco.MjsBody, finger: int, side: float) -> None:
         condim=4,
         priority=1,  # rubber decides the friction of what it touches
         solref=HARD_SOLREF,
-        **_collision(ARM),
+        **ARM.arguments,
     )
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -65,7 +65,7 @@ def _add_finger(hand: mujoco.MjsBody, finger: int, side: float) -> None:
         size=[half_size[0], half_size[1], 0.5 * _ROD_LENGTH_M],
         mass=0,
         rgba=_HAND_RGBA,
-        **_collision(ARM),
+        **ARM.arguments,
     )
 
 
@@ -91,7 +91,3 @@ def _add_motor(spec: mujoco.MjSpec) -> None:
     motor.ctrllimited, motor.ctrlrange = True, [0.0, const.FINGER_STROKE_M]
     force = 2 * const.FINGER_FORCE_N
     motor.forcelimited, motor.forcerange = True, [-force, force]
-
-
-def _collision(kind: Kind) -> dict[str, int]:
-    return {"contype": kind.type, "conaffinity": kind.affinity, "group": kind.group}

@@ -15,6 +15,7 @@ BLOCK_COUNT = 4
 NO_BLOCK = -1
 """What stands for none of the blocks where an index is expected."""
 BLOCK_SIZE_M = 0.04  # edge (kind: paper)
+BLOCK_REST_M = 0.5 * BLOCK_SIZE_M  # height of its centre on the table
 BLOCK_MASS_KG = 0.05  # kind: paper
 BLOCK_FRICTION = (1.0, 0.005, 0.0001)  # painted wood on a table top (kind: guess)
 
@@ -37,11 +38,6 @@ CAMERAS = {
     "top": CameraPose((0.0, 0.6, 0.8), (0.16, 0.575, 0.0), 40.0),
     "overview": CameraPose((-0.75, 0.05, 0.75), (0.25, 0.5, 0.15), 42.0),
 }
-
-
-def block_rest_height_m() -> float:
-    """Return the height of a block's centre when it lies on the table [m]."""
-    return 0.5 * BLOCK_SIZE_M
 
 
 def over_tray(pos_w: NDArray[np.float64]) -> bool:

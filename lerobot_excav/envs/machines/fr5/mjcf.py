@@ -7,7 +7,7 @@ from lerobot_excav.envs.machines.camera_pictures import add_camera
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.arm import add_arm
-from lerobot_excav.envs.machines.fr5.geoms import BLOCK, CELL, HARD_SOLREF, Kind
+from lerobot_excav.envs.machines.fr5.geoms import BLOCK, CELL, HARD_SOLREF
 from lerobot_excav.envs.machines.fr5.gripper import add_gripper
 
 _TRAY_RGBA = (0.35, 0.37, 0.40, 1.0)
@@ -71,7 +71,7 @@ def _add_table(spec: mujoco.MjSpec) -> None:
         size=[3.0, 3.0, 0.1],
         rgba=[0.6, 0.6, 0.6, 1.0],
         solref=HARD_SOLREF,
-        **_collision(CELL),
+        **CELL.arguments,
     )
 
 
@@ -86,7 +86,7 @@ def _add_tray(spec: mujoco.MjSpec) -> None:
         size=[layout.TRAY_RADIUS_M, half, 0],
         rgba=_TRAY_RGBA,
         solref=HARD_SOLREF,
-        **_collision(CELL),
+        **CELL.arguments,
     )
     radius = layout.TRAY_RADIUS_M
     for angle in 2 * np.pi * np.arange(_RIM_PIECES) / _RIM_PIECES:
@@ -97,7 +97,7 @@ def _add_tray(spec: mujoco.MjSpec) -> None:
             quat=[np.cos(0.5 * angle), 0, 0, np.sin(0.5 * angle)],
             rgba=_TRAY_RGBA,
             solref=HARD_SOLREF,
-            **_collision(CELL),
+            **CELL.arguments,
         )
 
 
@@ -114,9 +114,5 @@ def _add_block(spec: mujoco.MjSpec, i: int) -> None:
         friction=layout.BLOCK_FRICTION,
         condim=4,
         solref=HARD_SOLREF,
-        **_collision(BLOCK),
+        **BLOCK.arguments,
     )
-
-
-def _collision(kind: Kind) -> dict[str, int]:
-    return {"contype": kind.type, "conaffinity": kind.affinity, "group": kind.group}

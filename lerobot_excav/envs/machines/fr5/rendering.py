@@ -24,12 +24,7 @@ class WorkcellRenderer:
     def __init__(self, workcell: Workcell, *, height: int, width: int) -> None:
         model = workcell.model
         self._pictures = CameraPictures(
-            model,
-            workcell.data,
-            cameras=tuple(layout.CAMERAS),
-            height=height,
-            width=width,
-            max_geoms=_MAX_GEOMS,
+            model, workcell.data, cameras=tuple(layout.CAMERAS), height=height, width=width, max_geoms=_MAX_GEOMS
         )
         self._all = visible_groups(CELL.group, ARM.group, BLOCK.group)
         self._without_arm = visible_groups(CELL.group, BLOCK.group)

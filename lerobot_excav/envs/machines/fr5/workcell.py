@@ -1,6 +1,7 @@
 """The work cell in motion: arm, gripper and blocks under joint position targets."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -11,7 +12,6 @@ from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW
 from lerobot_excav.envs.machines.fr5.geoms import ARM
 from lerobot_excav.envs.machines.fr5.mjcf import build_model
-from lerobot_excav.envs.machines.fr5.start import WorkcellStart
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
 ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper target [0..1]
@@ -24,6 +24,29 @@ _REFERENCE_STEP = const.SUBSTEP_S * np.append(const.JOINT_SPEED_RAD_S, const.FIN
 _REFERENCE_LEAD_RAD = np.array(const.JOINT_DAMPING) / const.JOINT_STIFFNESS * const.JOINT_SPEED_RAD_S
 """How far it may be ahead of a joint: there the servo's stiffness and damping balance at the speed limit [rad]. Without
 this a joint that could not follow would catch up at several times that speed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkcellStart:
+    """Places, colours and light of the work cell. Its arrays are read-only.
+
+    Attributes:
+        joint_pos: Joint positions of the arm [rad], (6,).
+        block_pos_w: Centres of the blocks [m], (4, 3), world frame.
+        block_yaw: Turn of the blocks about z [rad], (4,).
+        block_rgb: Colours of the blocks, (4, 3), each channel in [0, 1].
+        table_rgb: Colour of the table, (3,).
+        light_dir_w: Direction of the light, (3,).
+        light: Brightness of the light, 0 to 1.
+    """
+
+    joint_pos: NDArray[np.float64]
+    block_pos_w: NDArray[np.float64]
+    block_yaw: NDArray[np.float64]
+    block_rgb: NDArray[np.float64]
+    table_rgb: NDArray[np.float64]
+    light_dir_w: NDArray[np.float64]
+    light: float
 
 
 class Workcell:

@@ -14,7 +14,6 @@ from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
 from lerobot_excav.envs.tasks.grasp.settings import FR5Settings
 from lerobot_excav.envs.tasks.grasp.task import GraspTask
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
-from lerobot_excav.errors import ConfigurationError
 
 _RETARGET_STREAM = 0x4E77  # names the random streams from which the second target is drawn
 
@@ -50,7 +49,7 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
 
     TASK = "FR5Grasp-v0"
 
-    _grasp: GraspTask | None = None
+    _grasp: GraspTask
 
     @property
     def workcell(self) -> Workcell:
@@ -64,8 +63,7 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
         Raises:
             ConfigurationError: The environment has not been reset.
         """
-        if self._grasp is None:
-            raise ConfigurationError("the environment has no episode yet; call reset() first")
+        self._require_episode()
         return self._grasp
 
     @property

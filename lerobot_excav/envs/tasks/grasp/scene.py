@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.constants import HOME_JOINT_POS
-from lerobot_excav.envs.machines.fr5.start import WorkcellStart
+from lerobot_excav.envs.machines.fr5.workcell import WorkcellStart
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.errors import ExcavError, require, require_choice
 
@@ -82,6 +82,6 @@ def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
         xy_w = rng.uniform(low, high, size=(layout.BLOCK_COUNT, 2))
         distance = np.linalg.norm(xy_w[:, None] - xy_w[None], axis=-1)
         if distance[np.triu_indices(layout.BLOCK_COUNT, 1)].min() >= layout.BLOCK_SPACING_M:
-            height = np.full((layout.BLOCK_COUNT, 1), layout.block_rest_height_m())
+            height = np.full((layout.BLOCK_COUNT, 1), layout.BLOCK_REST_M)
             return np.concatenate([xy_w, height], axis=1)
     raise ExcavError(f"no free places for {layout.BLOCK_COUNT} blocks in {_PLACING_TRIES} draws; report this scene")

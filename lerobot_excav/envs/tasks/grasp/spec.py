@@ -1,12 +1,6 @@
 """FR5Grasp-v0 as data."""
 
-from lerobot_excav.envs.machines.fr5.features import (
-    ACTION_HIGH,
-    ACTION_LOW,
-    ACTION_NAMES,
-    CAMERAS,
-    STATE_NAMES,
-)
+from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW, ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.tasks.grasp.settings import EPISODE_DURATION_S, FR5Settings
 from lerobot_excav.envs.tasks.task import TaskSpec
 

@@ -84,7 +84,7 @@ class GraspTask:
         """State of the task, never an input of a policy, (8,) float32; see `spec.TASK_STATE_NAMES`."""
         position_w = self._block_pos_w[self.target_id]
         values = (
-            position_w[2] - layout.block_rest_height_m(),
+            position_w[2] - layout.BLOCK_REST_M,
             np.linalg.norm(position_w - self._workcell.grasp_pos_w),
             np.hypot(*(position_w[:2] - layout.TRAY_POS_W)),
             self._touching[:, self.target_id].sum(),
@@ -113,8 +113,8 @@ class GraspTask:
         self._block_pos_w = cell.block_pos_w
         height = self._block_pos_w[:, 2]
         held = self._touching.all(axis=0)
-        self._lifted = held & (height > layout.block_rest_height_m() + LIFT_M)
-        flat = layout.TRAY_HEIGHT_M + layout.block_rest_height_m()
+        self._lifted = held & (height > layout.BLOCK_REST_M + LIFT_M)
+        flat = layout.TRAY_HEIGHT_M + layout.BLOCK_REST_M
         self._over_tray = np.array([layout.over_tray(position_w) for position_w in self._block_pos_w])
         self._arm_touching = cell.arm_touching()
         self._in_tray = (

@@ -15,7 +15,6 @@ from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.targets import Target
-from lerobot_excav.errors import ConfigurationError
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
 FULL_BUCKET_KG = 485.0
@@ -54,7 +53,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     TASK = "Scoop-v0"
 
-    _cycle: DigCycle | None = None
+    _cycle: DigCycle
 
     @property
     def worksite(self) -> Worksite:
@@ -68,8 +67,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         Raises:
             ConfigurationError: The environment has not been reset.
         """
-        if self._cycle is None:
-            raise ConfigurationError("the environment has no episode yet; call reset() first")
+        self._require_episode()
         return self._cycle
 
     @property

@@ -68,17 +68,9 @@ def _cells(
     along_range_m: tuple[float, float],
     half_width_m: float,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the nearest cells to 16 x 16 points of rectangles that point away from the machine.
+    """Return the nearest cells to 16 x 16 points of rectangles that point away from the machine, each (n, 16, 16).
 
-    Args:
-        centers_w: Where the rectangles have their zero [m], shape (n, 3).
-        x_w: Cell centres along x [m], shape (nx,).
-        y_w: Cell centres along y [m], shape (ny,).
-        along_range_m: Extent of the rectangles away from the machine [m].
-        half_width_m: Half of their extent across [m].
-
-    Returns:
-        Indices along x and y, each of shape (n, 16, 16).
+    They reach over a range along that direction, and over a half width to both sides, from centres (n, 3).
     """
     offset = centers_w[:, :2] - MACHINE_POS_W[:2]
     forward = (offset / np.linalg.norm(offset, axis=1, keepdims=True))[:, None, None, :]

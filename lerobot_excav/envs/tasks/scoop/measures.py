@@ -76,12 +76,7 @@ SCOOP_MEASURES = TaskMeasures(
         Column(key="full_success", header="full success [%]", kind=Kind.RATE, field="is_success"),
         Column(key="retained_mass_kg", header="retained [kg]", kind=Kind.MEAN, field="retained_mass_kg"),
         Column(key="efficiency", header="efficiency [%]", kind=Kind.RATIO, field="retained_mass_kg"),
-        Column(
-            key="residual_bucket_mass_kg",
-            header="residual [kg]",
-            kind=Kind.MEAN,
-            field="residual_bucket_mass_kg",
-        ),
+        Column(key="residual_bucket_mass_kg", header="residual [kg]", kind=Kind.MEAN, field="residual_bucket_mass_kg"),
         Column(key="hard_contact", header="hard contact [%]", kind=Kind.RATE, field="has_hard_contact"),
         Column(key="spill", header="spill [%]", kind=Kind.RATE, field="has_spill"),
     ),

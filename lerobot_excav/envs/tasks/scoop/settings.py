@@ -18,12 +18,7 @@ class ExcavatorSettings(TaskSettings):
     task: str = with_default(TaskSettings, "task", "Scoop-v0")
     fps: int = with_default(TaskSettings, "fps", 10)
     soil: str = setting(
-        "Soil preset",
-        default="sand",
-        choices=tuple(PRESETS),
-        also=SoilParameters,
-        is_column=True,
-        changes_start=True,
+        "Soil preset", default="sand", choices=tuple(PRESETS), also=SoilParameters, is_column=True, changes_start=True
     )
     fidelity: str = setting(
         "Numerical effort of the soil", default="standard", choices=tuple(FIDELITIES), is_column=True

@@ -51,12 +51,7 @@ class Target:
 
 
 def find_targets(
-    heights_m: NDArray[np.float64],
-    x_w: NDArray[np.float64],
-    y_w: NDArray[np.float64],
-    rng: np.random.Generator,
-    *,
-    count: int = TARGETS_PER_SCENE,
+    heights_m: NDArray[np.float64], x_w: NDArray[np.float64], y_w: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[Target, ...]:
     """Pick dig regions that are reachable and in view, hold enough soil and lie apart from each other.
 
@@ -65,13 +60,12 @@ def find_targets(
         x_w: Cell centres along x [m], shape (nx,).
         y_w: Cell centres along y [m], shape (ny,).
         rng: Source of the choice among the feasible regions.
-        count: How many to pick.
 
     Returns:
         The targets in an order that tells nothing of their places.
 
     Raises:
-        TooFewTargetsError: The pile offers fewer than `count` such regions.
+        TooFewTargetsError: The pile offers fewer than `TARGETS_PER_SCENE` such regions.
     """
     centers_w = feasible_centers_w(heights_m, x_w, y_w)
     apart = np.linalg.norm(centers_w[:, None, :2] - centers_w[None, :, :2], axis=-1) >= LEAST_DISTANCE_M
@@ -79,13 +73,10 @@ def find_targets(
     for _ in range(_ORDERS):
         free = np.ones(len(centers_w), dtype=bool)
         picked: list[int] = []
-        while len(picked) < count and free.any():
+        while len(picked) < TARGETS_PER_SCENE and free.any():
             picked.append(int(rng.choice(np.flatnonzero(free))))
             free &= apart[picked[-1]]
-        if len(picked) == count:
-            return tuple(_target(centers_w[i]) for i in picked)
-    raise TooFewTargetsError(f"the pile has no room for {count} dig regions; draw another pile")
-
-
-def _target(center_w: NDArray[np.float64]) -> Target:
-    return Target(center_w=center_w.copy(), yaw_rad=cylinder_from_world(center_w)[1])
+        if len(picked) == TARGETS_PER_SCENE:
+            chosen_w = centers_w[picked]
+            return tuple(Target(center_w=w.copy(), yaw_rad=cylinder_from_world(w)[1]) for w in chosen_w)
+    raise TooFewTargetsError(f"the pile has no room for {TARGETS_PER_SCENE} dig regions; draw another pile")

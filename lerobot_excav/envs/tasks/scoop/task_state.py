@@ -5,11 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.excavator.layout import (
-    DIG_AREA_EXTENT_M,
-    TARGET_BOX,
-    distance_to_box_footprint_m,
-)
+from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX, distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import Tool
 from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
@@ -124,11 +120,7 @@ def depth_below_dig_plane_m(tool: Tool) -> float:
     profile = tool.geometry.profile_t
     low, high = profile.min(axis=0), profile.max(axis=0)
     half_width = 0.5 * tool.geometry.inner_width_m
-    axes = (
-        np.linspace(low[0], high[0], 5),
-        np.linspace(-half_width, half_width, 5),
-        np.linspace(low[1], high[1], 5),
-    )
+    axes = (np.linspace(low[0], high[0], 5), np.linspace(-half_width, half_width, 5), np.linspace(low[1], high[1], 5))
     sample_t = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     sample_w = tool.position_w + sample_t @ tool.rotation_w.T
     inset = np.min(0.5 * np.array(DIG_AREA_EXTENT_M) - np.abs(sample_w[:, :2]), axis=1)

@@ -47,11 +47,7 @@ def seen_area_px(
 
 @kernel
 def hidden_cells(
-    heights_m: NDArray[np.float64],
-    x0_w: float,
-    y0_w: float,
-    cell_size_m: float,
-    eye_w: NDArray[np.float64],
+    heights_m: NDArray[np.float64], x0_w: float, y0_w: float, cell_size_m: float, eye_w: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Tell which cells other soil hides from an eye above the field.
 

@@ -11,27 +11,29 @@ from lerobot_excav.envs.machines.excavator.braking import (
     solved,
 )
 
+SEEDS = st.integers(0, 2**32 - 1)
 
-def random_inertia(rng: np.random.Generator, joints: int = 4) -> np.ndarray:
+
+def random_inertia(rng, joints=4):
     """A mass matrix like the machine's: some tonnes times square metres, coupled."""
     root = rng.normal(size=(joints, joints))
     return 3e3 * (root @ root.T) + np.diag(rng.uniform(100.0, 2e4, joints))
 
 
-def random_case(rng: np.random.Generator, count: int, *, friction: bool):
+def random_case(rng, count, *, friction):
     rows = rng.normal(size=(count, 3, 4)) * rng.uniform(0.0, 5.0, 4)
     limits = 10.0 ** rng.uniform(-1.0, 3.0, count)
     frictions = rng.uniform(0.0, 0.8, count) if friction else np.zeros(count)
     return rows, limits, frictions, random_inertia(rng), rng.normal(size=4)
 
 
-def one_patch(limit: float, friction: float = 0.0):
+def one_patch(limit, friction=0.0):
     """One joint of 100 kg m2 at a lever of 2 m: the point weighs 25 kg along the normal, one along a tangent."""
     rows = np.array([[[2.0, 0.0], [0.0, 2.0], [0.0, 0.0]]])
     return rows, np.array([limit]), np.array([friction]), 100.0 * np.eye(2)
 
 
-def relaxed(rows: np.ndarray, limits: np.ndarray, inertia: np.ndarray, free: np.ndarray) -> np.ndarray:
+def relaxed(rows, limits, inertia, free):
     """Velocities by projected Gauss-Seidel on smooth patches: slow, patch by patch, to the end."""
     inverse, velocity, impulses = np.linalg.inv(inertia), free.copy(), np.zeros(len(limits))
     for _ in range(20_000):
@@ -47,31 +49,31 @@ def relaxed(rows: np.ndarray, limits: np.ndarray, inertia: np.ndarray, free: np.
     return velocity
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 6))
-@settings(max_examples=50, deadline=None)
-def test_solved_solves(seed: int, size: int) -> None:
+@given(SEEDS, st.integers(1, 6))
+@settings(max_examples=50)
+def test_solved_solves(seed, size):
     rng = np.random.default_rng(seed)
     matrix, right = random_inertia(rng, size), rng.normal(size=size)
     np.testing.assert_allclose(matrix @ solved(matrix, right), right, rtol=1e-8, atol=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
-def test_rows_give_the_speed_of_a_rigid_body(seed: int) -> None:
+@given(SEEDS)
+@settings(max_examples=30)
+def test_rows_give_the_speed_of_a_rigid_body(seed):
     rng = np.random.default_rng(seed)
     rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     points, axes = rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 3))
     jacobian, joint_vel = rng.normal(size=(6, 4)), rng.normal(size=4)
     linear, angular = np.split(jacobian @ joint_vel, 2)
     expected = [
-        (rotation @ axis.T).T @ (linear + np.cross(angular, rotation @ point))
+        axis @ rotation.T @ (linear + np.cross(angular, rotation @ point))
         for point, axis in zip(points, axes, strict=True)
     ]
     rows = patch_rows(jacobian, np.ascontiguousarray(rotation), points, axes)
     np.testing.assert_allclose(patch_speeds(rows, joint_vel), expected, atol=1e-12)
 
 
-def test_a_weak_patch_gives_its_limit_and_a_strong_one_stops_the_motion() -> None:
+def test_a_weak_patch_gives_its_limit_and_a_strong_one_stops_the_motion():
     free = np.array([-0.5, 0.0])  # 1 m/s into the soil: 25 kg of point mass carry 25 N s
     total, impulses = braking_impulse(*one_patch(10.0), free)
     assert impulses[0, 0] == pytest.approx(10.0)
@@ -81,36 +83,36 @@ def test_a_weak_patch_gives_its_limit_and_a_strong_one_stops_the_motion() -> Non
     assert -CREEP_SPEED_M_S < 2.0 * (free + total / 100.0)[0] < 0.0
 
 
-def test_motion_out_of_the_soil_is_left_alone() -> None:
+def test_motion_out_of_the_soil_is_left_alone():
     total, impulses = braking_impulse(*one_patch(1e3, 0.5), np.array([0.5, 1.0]))
     assert not total.any()
     assert not impulses.any()
 
 
-def test_friction_is_the_push_times_its_coefficient_against_the_sliding() -> None:
+def test_friction_is_the_push_times_its_coefficient_against_the_sliding():
     _, impulses = braking_impulse(*one_patch(10.0, 0.4), np.array([-0.5, 3.0]))
     np.testing.assert_allclose(impulses[0], [10.0, -4.0, 0.0], rtol=1e-6)
 
 
-def test_friction_holds_what_it_can_hold() -> None:
+def test_friction_holds_what_it_can_hold():
     free = np.array([-0.5, 0.1])  # 5 N s along the tangent, against a grip of 10
     total, impulses = braking_impulse(*one_patch(1e6, 0.4), free)
     assert impulses[0, 1] == pytest.approx(-5.0, rel=1e-3)
     assert abs((free + total / 100.0)[1]) < CREEP_SPEED_M_S
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
-@settings(max_examples=40, deadline=None)
-def test_smooth_patches_give_what_relaxing_one_by_one_gives_in_the_end(seed: int, count: int) -> None:
+@given(SEEDS, st.integers(1, 12))
+@settings(max_examples=40)
+def test_smooth_patches_give_what_relaxing_one_by_one_gives_in_the_end(seed, count):
     rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=False)
     total, _ = braking_impulse(rows, limits, frictions, inertia, free)
     found = free + np.linalg.solve(inertia, total)
     np.testing.assert_allclose(found, relaxed(rows, limits, inertia, free), atol=1e-3)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 60))
-@settings(max_examples=150, deadline=None)
-def test_no_patches_drive_the_joints_or_reverse_a_point(seed: int, count: int) -> None:
+@given(SEEDS, st.integers(1, 60))
+@settings(max_examples=150)
+def test_no_patches_drive_the_joints_reverse_a_point_or_rub_more_than_they_can(seed, count):
     rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=True)
     total, impulses = braking_impulse(rows, limits, frictions, inertia, free)
     velocity = free + np.linalg.solve(inertia, total)
@@ -120,22 +122,14 @@ def test_no_patches_drive_the_joints_or_reverse_a_point(seed: int, count: int) -
     assert energy[1] <= energy[0] * (1.0 + 1e-12)
     assert (impulses[:, 0] >= 0.0).all()
     assert (impulses[:, 0] <= limits * (1.0 + 1e-12)).all()
+    assert (np.linalg.norm(impulses[:, 1:], axis=1) <= frictions * limits * (1.0 + 1e-9)).all()
     assert (speeds[impulses[:, 0] > 1e-6 * limits, 0] <= 1e-7).all()
     np.testing.assert_allclose(np.einsum("kaj,ka->j", rows, impulses), total, rtol=1e-9, atol=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-@settings(max_examples=50, deadline=None)
-def test_friction_stays_within_its_coefficient_of_the_limit(seed: int, count: int) -> None:
-    rows, limits, frictions, inertia, free = random_case(np.random.default_rng(seed), count, friction=True)
-    _, impulses = braking_impulse(rows, limits, frictions, inertia, free)
-    rub = np.linalg.norm(impulses[:, 1:], axis=1)
-    assert (rub <= frictions * limits * (1.0 + 1e-9)).all()
-
-
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
-def test_the_order_of_the_patches_does_not_matter(seed: int) -> None:
+@given(SEEDS)
+@settings(max_examples=30)
+def test_the_order_of_the_patches_does_not_matter(seed):
     rng = np.random.default_rng(seed)
     rows, limits, frictions, inertia, free = random_case(rng, 20, friction=True)
     order = rng.permutation(20)

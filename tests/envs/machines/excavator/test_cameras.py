@@ -15,9 +15,12 @@ def project(pose, points_w):
     return np.stack([WIDTH / 2 - focal * local[:, 0] / local[:, 2], HEIGHT / 2 + focal * local[:, 1] / local[:, 2]], 1)
 
 
-def in_picture(pose, points_w):
-    pixels = project(pose, points_w)
-    return ((pixels >= 0) & (pixels <= [WIDTH, HEIGHT])).all()
+def rectangle(half_x, half_y, center=(0.0, 0.0, 0.0), height=0.0):
+    return [np.add(center, (x, y, height)) for x in (-half_x, half_x) for y in (-half_y, half_y)]
+
+
+def on_machine(*points):
+    return np.add(points, const.MACHINE_POS_W)
 
 
 @pytest.mark.parametrize("pose", [MAIN, CAB, OVERVIEW])
@@ -29,34 +32,27 @@ def test_camera_axes_are_a_right_handed_frame_that_keeps_up_up(pose):
     assert rotation[2, 0] == pytest.approx(0.0)
 
 
-def rectangle(half_x, half_y, center=(0.0, 0.0, 0.0), height=0.0):
-    return [np.add(center, (x, y, height)) for x in (-half_x, half_x) for y in (-half_y, half_y)]
-
-
-def test_main_sees_every_place_where_a_pile_can_be():
-    assert in_picture(MAIN, rectangle(2.1, 2.1))
-    assert in_picture(MAIN, rectangle(1.0, 1.5, height=1.2))
-
-
-def test_main_sees_into_the_target_box():
-    assert in_picture(MAIN, rectangle(0.5, 0.5, center=TARGET_BOX.center_w))
-
-
-def test_main_sees_the_cab_and_the_tracks():
-    assert in_picture(MAIN, [np.add(const.MACHINE_POS_W, p) for p in ((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0))])
-
-
-def test_overview_sees_the_whole_dig_area_the_box_and_the_raised_boom():
-    assert in_picture(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)))
-    for height in (0.0, TARGET_BOX.wall_height_m):
-        assert in_picture(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, height))
-    assert in_picture(OVERVIEW, [np.add(const.MACHINE_POS_W, p) for p in ((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3))])
+@pytest.mark.parametrize(
+    ("pose", "points_w"),
+    [
+        pytest.param(MAIN, rectangle(2.1, 2.1), id="main: where a pile can be"),
+        pytest.param(MAIN, rectangle(1.0, 1.5, height=1.2), id="main: its top"),
+        pytest.param(MAIN, rectangle(0.5, 0.5, TARGET_BOX.center_w), id="main: into the box"),
+        pytest.param(MAIN, on_machine((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0)), id="main: cab and tracks"),
+        pytest.param(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)), id="overview: dig area"),
+        pytest.param(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w), id="overview: box"),
+        pytest.param(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, 1.0), id="overview: wall"),
+        pytest.param(OVERVIEW, on_machine((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3)), id="overview: raised boom"),
+    ],
+)
+def test_a_camera_sees_what_it_is_for(pose, points_w):
+    pixels = project(pose, points_w)
+    assert ((pixels >= 0) & (pixels <= [WIDTH, HEIGHT])).all()
 
 
 def test_cab_sees_the_middle_of_the_box_over_its_wall():
     eye = np.array([*const.MACHINE_POS_W[:2], const.SWING_HEIGHT_M + CAB.position[2]])
-    to_box = TARGET_BOX.center_w[:2] - eye[:2]
-    distance = np.hypot(*to_box) - CAB.position[0]
+    distance = np.hypot(*(TARGET_BOX.center_w[:2] - eye[:2])) - CAB.position[0]
     wall = distance - TARGET_BOX.half_extent_m.min() - const.BOX_WALL_THICKNESS_M
     line_of_sight = eye[2] + (TARGET_BOX.wall_height_m - eye[2]) * distance / wall
     assert line_of_sight < 0.4  # the height of one scoop's heap
@@ -65,8 +61,7 @@ def test_cab_sees_the_middle_of_the_box_over_its_wall():
 @pytest.mark.parametrize("x", [-1.5, 0.0, 1.5])
 @pytest.mark.parametrize("y", [-1.5, 0.0, 1.5])
 def test_dig_region_is_large_enough_in_the_default_picture(x, y):
-    corners = [(x + dx, y + dy, 0.4) for dx in (-0.4, 0.4) for dy in (-0.4, 0.4)]
-    width, height = np.ptp(project(MAIN, corners), axis=0)
+    width, height = np.ptp(project(MAIN, rectangle(0.4, 0.4, (x, y, 0.4))), axis=0)
     assert width >= 9.0
     assert height >= 6.0
 

@@ -7,45 +7,26 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.digging import JointResistance
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
-from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import Reaction, Soil
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
 
 REACHED_OUT = np.array([0.0, 0.6, -1.2, -0.8])
 ARM_IN = np.array([0.0, 0.0, -1.0, 0.0])
-COM_T = np.array([0.6, 0.0, 0.2])
-
-
-@pytest.fixture(scope="module")
-def machine():
-    return ExcavatorMachine(container=TARGET_BOX)
+NOTHING = Patches.none()
 
 
 def reaction_of(patches):
-    return Reaction(
-        force_w_n=np.zeros(3),
-        torque_w_nm=np.zeros(3),
-        payload_mass_kg=0.0,
-        payload_com_t=COM_T,
-        patches=patches,
-    )
+    none, com_t = np.zeros(3), np.array([0.6, 0.0, 0.2])
+    return Reaction(force_w_n=none, torque_w_nm=none, payload_mass_kg=0.0, payload_com_t=com_t, patches=patches)
 
 
 def edge_reaction(machine, force_w_n, friction=0.0):
     """Soil at the cutting edge that can push with a force."""
-    size = float(np.linalg.norm(force_w_n))
+    size = np.linalg.norm(force_w_n, keepdims=True)
     if size == 0.0:
-        return reaction_of(Patches.none())
-    return reaction_of(
-        Patches.alike(
-            machine.cutting_edge_pos_w[None],
-            np.asarray(force_w_n, float)[None] / size,
-            np.array([size]),
-            friction,
-            PatchKind.WEDGE,
-        )
-    )
+        return reaction_of(NOTHING)
+    normal_w = np.array([force_w_n]) / size
+    return reaction_of(Patches.alike(machine.cutting_edge_pos_w[None], normal_w, size, friction, PatchKind.WEDGE))
 
 
 def pull_in(machine, force_n, ticks=100):
@@ -76,9 +57,9 @@ def random_patches(rng, machine, count=25):
     )
 
 
-def works_of_substeps(machine, resistance, ctrl_at, ticks, renew):
+def works_of_substeps(machine, ctrl_at, ticks, renew):
     """Drive the servos and return the work of the soil on the joints [J] in every substep."""
-    model, data, works = machine.model, machine.data, []
+    model, data, works, resistance = machine.model, machine.data, [], JointResistance(machine.model)
     for i in range(10 * ticks):
         if i % 10 == 0:
             mujoco.mj_fwdPosition(model, data)
@@ -102,21 +83,17 @@ def test_small_resistance_is_overcome_and_large_resistance_stalls(machine):
 
 
 @pytest.mark.parametrize("force_n", [1e4, 5e4, 1e5, 1e6, 1e8])
-def test_resistance_of_any_size_never_reverses_the_edge(machine, force_n):
-    assert pull_in(machine, force_n).max() <= 1e-6
-
-
-@pytest.mark.parametrize("force_n", [5e4, 1e6, 1e8])
-def test_stall_does_not_chatter(machine, force_n):
-    speeds = pull_in(machine, force_n)[40:]
-    assert np.abs(np.diff(speeds)).max() <= 1e-3
+def test_resistance_of_any_size_never_reverses_the_edge_nor_chatters_in_a_stall(machine, force_n):
+    speeds = pull_in(machine, force_n)
+    assert speeds.max() <= 1e-6
+    if force_n in (5e4, 1e6, 1e8):
+        assert np.abs(np.diff(speeds[40:])).max() <= 1e-3
 
 
 def test_resistance_takes_energy_in_every_substep(machine):
     machine.reset(REACHED_OUT)
     works = works_of_substeps(
         machine,
-        JointResistance(machine.model),
         lambda i: REACHED_OUT + 0.3 * np.sin(i / 30.0) * np.array([1.0, 0.5, -1.0, 1.0]),
         50,
         lambda: edge_reaction(machine, [4e4, 5e3, 2e4], friction=0.5),
@@ -126,14 +103,13 @@ def test_resistance_takes_energy_in_every_substep(machine):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_no_arrangement_of_soil_gives_energy_to_any_motion(machine, seed):
     rng = np.random.default_rng(seed)
     machine.reset(REACHED_OUT)
     amplitude, phase = rng.uniform(-0.5, 0.5, 4), rng.uniform(0.0, 6.3, 4)
     works = works_of_substeps(
         machine,
-        JointResistance(machine.model),
         lambda i: REACHED_OUT + amplitude * (np.sin(i / 20.0 + phase) - np.sin(phase)),
         10,
         lambda: reaction_of(random_patches(rng, machine)),
@@ -147,7 +123,6 @@ def test_soil_under_a_bucket_that_stands_on_hard_ground_gives_no_energy(machine)
     machine.reset(pose)
     works = works_of_substeps(
         machine,
-        JointResistance(machine.model),
         lambda i: pose + np.array([0.0, -0.3, -0.2, 0.0]) * min(1.0, i / 200.0),
         60,
         lambda: edge_reaction(machine, [5e3, 0.0, 2e4], friction=0.4),
@@ -176,7 +151,7 @@ def test_the_prediction_behind_it_is_the_motion_that_mujoco_makes(machine):
 def test_a_moving_bucket_feels_the_patch_in_full_where_it_is(machine):
     machine.reset(REACHED_OUT)
     for _ in range(25):
-        machine.tick(ARM_IN, edge_reaction(machine, [0.0, 0.0, 0.0]))
+        machine.tick(ARM_IN, reaction_of(NOTHING))
     resistance, data = JointResistance(machine.model), machine.data
     resistance.set_reaction(edge_reaction(machine, [1e3, 0.0, 0.0]), data)
     data.qfrc_applied[:] = 0.0
@@ -190,7 +165,7 @@ def test_a_moving_bucket_feels_the_patch_in_full_where_it_is(machine):
 def test_resistance_is_gone_in_the_tick_after_the_reaction(machine):
     pull_in(machine, 1e4, ticks=20)
     assert machine.data.qfrc_applied.any()
-    machine.tick(ARM_IN, edge_reaction(machine, [0.0, 0.0, 0.0]))
+    machine.tick(ARM_IN, reaction_of(NOTHING))
     assert not machine.data.qfrc_applied.any()
 
 
@@ -199,14 +174,9 @@ def test_a_couple_resists_turning(machine):
         machine.reset(REACHED_OUT)
         for _ in range(30):
             tool = machine.tool()
-            push = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-            couple = Patches.alike(
-                tool.position_w + np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
-                push,
-                np.full(2, torque_nm / 2.0),
-                0.0,
-                PatchKind.PRESSURE,
-            )
+            push_w, apart = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+            half = np.full(2, torque_nm / 2.0)
+            couple = Patches.alike(tool.position_w + apart, push_w, half, 0.0, PatchKind.PRESSURE)
             machine.tick(np.array([0.0, 0.0, 0.0, -1.0]), reaction_of(couple))
         return machine.joint_vel[3]
 
@@ -218,8 +188,7 @@ def test_a_limit_that_flips_every_tick_shakes_no_stalled_bucket(machine):
     machine.reset(REACHED_OUT)
     speeds = []
     for i in range(120):
-        force = 3e5 if i % 2 else 1e5
-        machine.tick(ARM_IN, edge_reaction(machine, [force, 0.0, 0.0]))
+        machine.tick(ARM_IN, edge_reaction(machine, [3e5 if i % 2 else 1e5, 0.0, 0.0]))
         speeds.append(machine.joint_vel[2])
     assert np.abs(np.diff(speeds[60:])).max() < 1e-4
 
@@ -234,13 +203,11 @@ def dug_in(machine, pitch, height=0.8, edge_height=0.3):
 
 
 def test_a_bucket_at_rest_in_soil_stays(machine):
-    soil = dug_in(machine, -1.9)
-    for _ in range(10):
+    soil, poses = dug_in(machine, -1.9), []
+    for _ in range(110):
         machine.tick(np.zeros(4), soil.step(const.TICK_S, machine.tool()))
-    before = machine.joint_pos
-    for _ in range(100):
-        machine.tick(np.zeros(4), soil.step(const.TICK_S, machine.tool()))
-    assert np.abs(machine.joint_pos - before).max() < 1e-3
+        poses.append(machine.joint_pos)
+    assert np.abs(poses[-1] - poses[9]).max() < 1e-3
     assert np.abs(machine.joint_vel).max() < 1e-3
 
 

@@ -1,17 +1,9 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator import grains
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
 from lerobot_excav.envs.machines.excavator.grains import MOST_PARCELS, PARCELS_PER_SKIN, Grains
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
-from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.soil import FIDELITIES
-
-
-@pytest.fixture(scope="module")
-def model():
-    return build_spec(TARGET_BOX, (2.0, 2.0)).compile()
 
 
 def shown_vertices(model):
@@ -21,10 +13,10 @@ def shown_vertices(model):
     return np.concatenate([model.skin_vert[s : s + model.skin_vertnum[skins[0]]] for s in starts] or [[]])
 
 
-@pytest.mark.parametrize("count", [0, 1, PARCELS_PER_SKIN, PARCELS_PER_SKIN + 1, MOST_PARCELS])
-def test_as_many_skins_are_drawn_as_the_parcels_fill(model, count):
+@pytest.mark.parametrize("count", [0, 1, PARCELS_PER_SKIN, PARCELS_PER_SKIN + 1, MOST_PARCELS, MOST_PARCELS + 7])
+def test_as_many_skins_are_drawn_as_the_parcels_fill_and_the_rest_is_left_out(model, count):
     Grains(model).show(np.zeros((count, 3)), np.ones(count))
-    assert (model.skin_group == LOOSE_SOIL_GROUP).sum() == -(-count // PARCELS_PER_SKIN)
+    assert (model.skin_group == LOOSE_SOIL_GROUP).sum() == -(-min(count, MOST_PARCELS) // PARCELS_PER_SKIN)
     assert (model.skin_group == HIDDEN_GROUP).sum() >= 1
 
 
@@ -45,11 +37,6 @@ def test_what_is_left_of_a_skin_is_not_seen(model):
     vertices = shown_vertices(model).reshape(PARCELS_PER_SKIN, -1, 3)
     assert np.ptp(vertices[0], axis=0).min() > 0.02
     assert not np.ptp(vertices[1:], axis=(0, 1)).any()
-
-
-def test_more_parcels_than_there_are_grains_are_left_out(model):
-    Grains(model).show(np.zeros((MOST_PARCELS + 7, 3)), np.ones(MOST_PARCELS + 7))
-    assert len(shown_vertices(model)) == MOST_PARCELS * grains._VERTICES
 
 
 def test_the_finest_soil_has_no_more_parcels_than_are_drawn():

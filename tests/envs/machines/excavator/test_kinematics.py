@@ -6,48 +6,31 @@ from hypothesis import strategies as st
 
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.kinematics import forward, inverse
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
-from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 
 joint_positions = st.tuples(*[st.floats(lower, upper) for lower, upper in const.JOINT_RANGE_RAD])
 
 
-@pytest.fixture(scope="module")
-def mujoco_state():
-    model = build_spec(TARGET_BOX, (6.0, 6.0)).compile()
-    return model, mujoco.MjData(model)
-
-
 @settings(deadline=None)
 @given(joint_pos=joint_positions)
-def test_forward_agrees_with_mujoco(mujoco_state, joint_pos):
-    model, data = mujoco_state
+def test_forward_agrees_with_mujoco(compiled, joint_pos):
+    data = mujoco.MjData(compiled)
     data.qpos[:] = joint_pos
-    mujoco.mj_kinematics(model, data)
+    mujoco.mj_kinematics(compiled, data)
     edge_w, pitch = forward(joint_pos)
     np.testing.assert_allclose(edge_w, data.site("cutting_edge").xpos, atol=1e-9)
     chord_w = data.body("bucket").xmat.reshape(3, 3)[:, 0]
     assert chord_w[2] == pytest.approx(np.sin(pitch), abs=1e-9)
 
 
-@given(joint_pos=joint_positions)
-def test_inverse_undoes_forward(joint_pos):
+@given(joint_pos=joint_positions, turns=st.integers(-2, 2))
+def test_inverse_undoes_forward_with_any_number_of_turns_of_the_pitch(joint_pos, turns):
     edge_w, pitch = forward(joint_pos)
     swing = joint_pos[0]
     offset = edge_w - const.MACHINE_POS_W
     radius = offset[0] * np.cos(swing) + offset[1] * np.sin(swing)
-    found = inverse(radius, edge_w[2], pitch, swing)
+    found = inverse(radius, edge_w[2], pitch + turns * 2 * np.pi, swing)
     assert found is not None
     np.testing.assert_allclose(found, joint_pos, atol=1e-6)
-
-
-@given(joint_pos=joint_positions, turns=st.integers(-2, 2))
-def test_pitch_may_be_given_with_any_number_of_turns(joint_pos, turns):
-    edge_w, pitch = forward(joint_pos)
-    radius = np.cos(joint_pos[0]) * (edge_w[0] + 4.6) + np.sin(joint_pos[0]) * edge_w[1]
-    found = inverse(radius, edge_w[2], pitch + turns * 2 * np.pi, joint_pos[0])
-    assert found is not None
-    assert found[3] == pytest.approx(joint_pos[3], abs=1e-6)
 
 
 @given(radius=st.floats(-2, 9), height=st.floats(-6, 9), pitch=st.floats(-7, 7), swing=st.floats(-4, 4))
@@ -65,14 +48,10 @@ def test_inverse_returns_a_pose_that_reaches_or_none(radius, height, pitch, swin
 
 
 @pytest.mark.parametrize(
-    ("radius", "height"),
-    [(7.5, 0.0), (3.0, -5.0), (3.0, 8.0), (-3.0, 1.0)],
-    ids=["far", "deep", "high", "behind"],
+    ("radius", "height", "swing"),
+    [(7.5, 0.0, 0.0), (3.0, -5.0, 0.0), (3.0, 8.0, 0.0), (-3.0, 1.0, 0.0), (4.5, 1.0, 3.5)],
+    ids=["far", "deep", "high", "behind", "turned too far"],
 )
-def test_unreachable_points_have_no_pose(radius, height):
-    assert inverse(radius, height, -1.5, 0.0) is None
-
-
-def test_swing_outside_its_range_has_no_pose():
+def test_unreachable_points_have_no_pose(radius, height, swing):
     assert inverse(4.5, 1.0, -1.5, 0.0) is not None
-    assert inverse(4.5, 1.0, -1.5, 3.5) is None
+    assert inverse(radius, height, -1.5, swing) is None

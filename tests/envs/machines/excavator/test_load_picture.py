@@ -4,16 +4,9 @@ import pytest
 from lerobot_excav.envs.machines.excavator import load_picture
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.load_picture import LOAD_SKIN, LoadPicture, load_grid
-from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 
 RADIUS_M = 0.045
-
-
-@pytest.fixture
-def model():
-    return build_spec(TARGET_BOX, (2.0, 2.0)).compile()
 
 
 def surface(model):
@@ -65,16 +58,11 @@ def test_the_skin_never_leaves_through_the_shell(model):
     assert (places @ bottom[:, :3].T - bottom[:, 3]).max() <= 0.02 + 1e-6
 
 
-def test_parcels_below_the_skin_are_not_seen(model):
-    upper, lower = layer(0.05), layer(0.25)
-    seen = LoadPicture(model).show(np.concatenate([upper[0], lower[0]]), np.concatenate([upper[1], lower[1]]))
-    assert not seen[len(upper[0]) :].any()
-
-
-def test_a_parcel_that_stands_out_is_seen(model):
-    places, radii = layer(0.15)
-    seen = LoadPicture(model).show(np.append(places, [(0.6, 0.0, -0.1)], axis=0), np.append(radii, RADIUS_M))
-    assert seen[-1]
+def test_a_parcel_that_stands_out_is_seen_and_those_below_the_skin_are_not(model):
+    places = np.concatenate([[(0.6, 0.0, -0.1)], layer(0.05)[0], layer(0.25)[0]])
+    seen = LoadPicture(model).show(places, np.full(len(places), RADIUS_M))
+    assert seen[0]
+    assert not seen[places[:, 2] == 0.25].any()
 
 
 def test_the_skin_faces_out_of_the_opening(model):

@@ -1,3 +1,5 @@
+import copy
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,16 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
-from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
 
 COM_T = np.array([0.65, 0.1, 0.15])
-
-
-@pytest.fixture
-def model():
-    return build_spec(TARGET_BOX, (6.0, 6.0)).compile()
 
 
 @pytest.fixture
@@ -28,27 +23,25 @@ def fill(payload, mass_kg, com_t=COM_T, ticks=10):
             payload.approach(mass_kg, com_t, remaining)
 
 
-def test_new_bucket_is_empty(model, payload):
-    assert payload.mass_kg == 0.0
-    assert model.body("payload").mass[0] == 0.0
-    assert not model.body("payload").inertia.any()
+def test_a_small_change_arrives_within_the_tick_and_a_reset_empties_the_bucket_at_once(model, payload):
+    body = model.body("payload")
+    for _ in range(2):
+        assert payload.mass_kg == body.mass[0] == 0.0
+        assert not body.inertia.any()
+        fill(payload, 100.0, ticks=1)
+        assert body.mass[0] == pytest.approx(100.0)
+        np.testing.assert_allclose(body.ipos, COM_T)
+        payload.reset()
 
 
-def test_payload_arrives_within_the_tick_when_the_change_is_small(model, payload):
-    fill(payload, 100.0, ticks=1)
-    assert model.body("payload").mass[0] == pytest.approx(100.0)
-    np.testing.assert_allclose(model.body("payload").ipos, COM_T)
-
-
-def test_mass_never_changes_faster_than_its_rate(model, payload):
-    limit = const.PAYLOAD_RATE_KG_S * const.SUBSTEP_S
+def test_mass_never_changes_faster_than_its_rate(payload):
     masses = [0.0]
     for target in (485.0, 0.0):
         for _ in range(3):
             for remaining in range(10, 0, -1):
                 payload.approach(target, COM_T, remaining)
                 masses.append(payload.mass_kg)
-    assert np.abs(np.diff(masses)).max() <= limit + 1e-9
+    assert np.abs(np.diff(masses)).max() <= const.PAYLOAD_RATE_KG_S * const.SUBSTEP_S + 1e-9
     assert max(masses) == pytest.approx(485.0)
     assert masses[-1] == pytest.approx(0.0, abs=1e-9)
 
@@ -84,21 +77,6 @@ def test_load_adds_to_the_inertia_of_the_swing(model, payload):
     assert inertia[1] - inertia[0] == pytest.approx(485.0 * radius**2, rel=0.01)
 
 
-def test_reset_empties_the_bucket_at_once(model, payload):
-    fill(payload, 300.0)
-    payload.reset()
-    assert model.body("payload").mass[0] == 0.0
-
-
-def passive(model):
-    """Take motors, gravity and joint limits away: what is left is a mechanism that keeps its momentum."""
-    model.actuator_gainprm[:] = 0.0
-    model.actuator_biasprm[:] = 0.0
-    model.opt.gravity[:] = 0.0
-    model.jnt_limited[:] = 0
-    return mujoco.MjData(model)
-
-
 def coast(model, data, payload, mass_kg, com_t, ticks):
     """Coast while the payload changes; return energies [J] and momenta of the swing [N m s] after each substep."""
     energies, momenta, mass = [], [], np.zeros((4, 4))
@@ -118,7 +96,12 @@ def coast(model, data, payload, mass_kg, com_t, ticks):
 
 
 def swinging(model, joint_vel=(0.8, 0.0, 0.0, 0.0)):
-    data = passive(model)
+    """Take motors, gravity and joint limits away: what is left is a moving mechanism that keeps its momentum."""
+    model.actuator_gainprm[:] = 0.0
+    model.actuator_biasprm[:] = 0.0
+    model.opt.gravity[:] = 0.0
+    model.jnt_limited[:] = 0
+    data = mujoco.MjData(model)
     data.qpos[:] = [0.0, 0.3, -0.8, -0.3]
     data.qvel[:] = joint_vel
     mujoco.mj_forward(model, data)
@@ -155,17 +138,13 @@ def test_soil_that_leaves_takes_its_momentum_along(model, payload):
     assert (np.diff(energies) <= 1e-3 * energies[0]).all()
 
 
-@given(
-    st.lists(
-        st.tuples(st.floats(0.0, 500.0), st.floats(0.2, 1.0), st.floats(-0.3, 0.3), st.floats(0.0, 0.5)),
-        min_size=1,
-        max_size=5,
-    ),
-    st.tuples(*[st.floats(-0.8, 0.8)] * 4),
-)
-@settings(max_examples=25, deadline=None)
-def test_no_load_that_comes_goes_or_shifts_gives_energy_to_the_machine(loads, joint_vel):
-    model = build_spec(TARGET_BOX, (6.0, 6.0)).compile()
+LOADS = st.tuples(st.floats(0.0, 500.0), st.floats(0.2, 1.0), st.floats(-0.3, 0.3), st.floats(0.0, 0.5))
+
+
+@given(st.lists(LOADS, min_size=1, max_size=5), st.tuples(*[st.floats(-0.8, 0.8)] * 4))
+@settings(max_examples=25)
+def test_no_load_that_comes_goes_or_shifts_gives_energy_to_the_machine(compiled, loads, joint_vel):
+    model = copy.copy(compiled)
     payload, data = Payload(model), swinging(model, joint_vel)
     start, _ = coast(model, data, payload, 0.0, COM_T, 1)
     for mass_kg, *com_t in loads:

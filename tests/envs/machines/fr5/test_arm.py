@@ -4,9 +4,6 @@ import pytest
 
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.layout import BASE_POS_W
-from lerobot_excav.envs.tasks.grasp.scene import draw_scene
-
-SCENE = draw_scene("train", 0)
 
 
 def flange_pos_b(workcell, joint_pos):
@@ -24,12 +21,7 @@ def denavit_hartenberg(joint_pos):
     pose = np.eye(4)
     for q, a_i, d_i, alpha_i in zip(joint_pos, a, d, alpha, strict=True):
         c, s, ca, sa = np.cos(q), np.sin(q), np.cos(alpha_i), np.sin(alpha_i)
-        pose = pose @ [
-            [c, -s * ca, s * sa, a_i * c],
-            [s, c * ca, -c * sa, a_i * s],
-            [0, sa, ca, d_i],
-            [0, 0, 0, 1],
-        ]
+        pose = pose @ [[c, -s * ca, s * sa, a_i * c], [s, c * ca, -c * sa, a_i * s], [0, sa, ca, d_i], [0, 0, 0, 1]]
     return pose[:3, 3]
 
 
@@ -48,60 +40,49 @@ def test_tool_points_down_at_home(workcell):
     assert workcell.data.site("flange").xmat.reshape(3, 3)[:, 2] == pytest.approx([0, 0, -1], abs=1e-9)
 
 
-def test_moving_masses_are_those_of_the_constants(workcell):
+def test_arm_weighs_what_the_constants_say_and_gripper_what_its_manual_says(workcell):
     masses = [workcell.model.body(f"link{i + 1}").mass[0] for i in range(6)]
     expected = [const.MASS_SCALE * inertia.mass_kg for inertia in const.LINK_INERTIAS]
     assert masses == pytest.approx(expected, rel=1e-9)
-
-
-def test_gripper_weighs_what_its_manual_says(workcell):
     parts = [workcell.model.body(name).mass[0] for name in ("hand", *const.FINGER_NAMES)]
     assert sum(parts) == pytest.approx(0.43, abs=1e-9)
 
 
-def test_arm_holds_still_under_gravity(workcell):
-    workcell.reset(SCENE)
-    before = workcell.joint_pos
+def test_arm_holds_still_under_gravity(started, scene):
+    before = started.joint_pos
     for _ in range(100):
-        workcell.tick(np.append(SCENE.joint_pos, 1.0))
-    assert workcell.joint_pos == pytest.approx(before, abs=1e-6)
-    assert np.abs(workcell.joint_vel).max() < 1e-6
+        started.tick(np.append(scene.joint_pos, 1.0))
+    assert started.joint_pos == pytest.approx(before, abs=1e-6)
+    assert np.abs(started.joint_vel).max() < 1e-6
+    assert abs(started.joint_torque[1]) > 10.0  # the drives carry the weight
 
 
-def test_weight_is_carried_by_the_drives(workcell):
-    workcell.reset(SCENE)
-    assert abs(workcell.joint_torque[1]) > 10.0
-
-
-def test_torques_stay_within_the_datasheet_limits_under_wild_commands(workcell):
-    workcell.reset(SCENE)
+def test_torques_stay_within_the_datasheet_limits_under_wild_commands(started):
     rng = np.random.default_rng(0)
     for _ in range(60):
-        workcell.tick(np.append(rng.uniform(*const.JOINT_LIMITS_RAD.T), rng.uniform()))
-        assert (np.abs(workcell.joint_torque) <= const.JOINT_TORQUE_N_M + 1e-9).all()
+        started.tick(np.append(rng.uniform(*const.JOINT_LIMITS_RAD.T), rng.uniform()))
+        assert (np.abs(started.joint_torque) <= const.JOINT_TORQUE_N_M + 1e-9).all()
 
 
-def test_joints_turn_no_faster_than_the_datasheet_allows(workcell):
-    workcell.reset(SCENE)
-    target = np.append(SCENE.joint_pos + np.array([1.5, 0, 0, 0, 0, -1.5]), 1.0)
+def test_joints_turn_no_faster_than_the_datasheet_allows(started, scene):
+    target = np.append(scene.joint_pos + np.array([1.5, 0, 0, 0, 0, -1.5]), 1.0)
     fastest = np.zeros(6)
     for _ in range(40):
-        workcell.tick(target)
-        fastest = np.maximum(fastest, np.abs(workcell.joint_vel))
+        started.tick(target)
+        fastest = np.maximum(fastest, np.abs(started.joint_vel))
     assert fastest[0] > 0.9 * const.JOINT_SPEED_RAD_S[0]
     assert (fastest < 1.05 * const.JOINT_SPEED_RAD_S).all()
 
 
-def test_a_joint_that_was_held_back_does_not_catch_up_beyond_its_speed_limit(workcell):
+def test_a_joint_that_was_held_back_does_not_catch_up_beyond_its_speed_limit(started, scene):
     """Wild commands saturate the torque; a reference that ran ahead meanwhile would be chased far too fast."""
-    workcell.reset(SCENE)
     rng = np.random.default_rng(0)
-    raised = SCENE.joint_pos.copy()
+    raised = scene.joint_pos.copy()
     fastest = np.zeros(6)
     for _ in range(40):
         target = np.clip(raised + rng.uniform(-1.5, 1.5, 6), *const.JOINT_LIMITS_RAD.T)
         target[1:3] = raised[1:3] + rng.uniform(-0.3, 0.3, 2)  # high above the table
         for _ in range(3):
-            workcell.tick(np.append(target, 1.0))
-            fastest = np.maximum(fastest, np.abs(workcell.joint_vel))
+            started.tick(np.append(target, 1.0))
+            fastest = np.maximum(fastest, np.abs(started.joint_vel))
     assert (fastest < 1.25 * const.JOINT_SPEED_RAD_S).all()

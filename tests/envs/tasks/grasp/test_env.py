@@ -5,18 +5,22 @@ from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.grasp.operator import GraspOperator
 
 
-@pytest.fixture(scope="module")
-def env():
-    env = FR5GraspEnv(obs_type="agent_pos")
-    yield env
-    env.close()
+def blind(**settings):
+    return FR5GraspEnv(obs_type="agent_pos", **settings)
 
 
-@pytest.fixture(scope="module")
-def seeing_env():
-    env = FR5GraspEnv()
-    yield env
-    env.close()
+@pytest.fixture
+def make():
+    """Make an environment; settings go to it."""
+    envs = []
+
+    def _make(**settings):
+        envs.append(FR5GraspEnv(**settings))
+        return envs[-1]
+
+    yield _make
+    for env in envs:
+        env.close()
 
 
 def hold(env):
@@ -43,7 +47,8 @@ def operate(env):
     return total, told, info["episode_metrics"]
 
 
-def test_success_is_told_at_the_end_of_8_s_and_the_return_is_the_sum_of_rewards(env):
+def test_success_is_told_at_the_end_of_8_s_and_the_return_is_the_sum_of_rewards():
+    env = blind()
     env.reset(seed=1)
     total, told, metrics = operate(env)
     assert told == [False] * 399 + [True]
@@ -51,7 +56,7 @@ def test_success_is_told_at_the_end_of_8_s_and_the_return_is_the_sum_of_rewards(
 
 
 def test_frames_may_last_several_ticks():
-    env = FR5GraspEnv(obs_type="agent_pos", fps=25)
+    env = blind(fps=25)
     env.reset(seed=1)
     env.step(hold(env))
     assert env.workcell.data.time == pytest.approx(0.04)
@@ -60,17 +65,18 @@ def test_frames_may_last_several_ticks():
     assert operate(env)[2]["is_success"]
 
 
-def test_mask_shows_the_commanded_block_and_stays(seeing_env):
-    masks = [start_mask(seeing_env, scene_id=4, target_id=i) for i in range(4)]
-    assert np.array_equal(np.stack(masks), seeing_env.renderer.block_pixels())
+def test_mask_shows_the_commanded_block_and_stays(make):
+    env = make()
+    masks = [start_mask(env, scene_id=4, target_id=i) for i in range(4)]
+    assert np.array_equal(np.stack(masks), env.renderer.block_pixels())
     for _ in range(3):
-        observation, *_ = seeing_env.step(hold(seeing_env))
+        observation, *_ = env.step(hold(env))
         assert np.array_equal(mask_of(observation), masks[3])
 
 
 @pytest.mark.parametrize("condition", ["correct", "zero", "random", "mismatched"])
-def test_metrics_name_the_block_whose_mask_is_shown(condition):
-    env = FR5GraspEnv(mask_condition=condition, episode_length=1)
+def test_metrics_name_the_block_whose_mask_is_shown(make, condition):
+    env = make(mask_condition=condition, episode_length=1)
     shown = start_mask(env, scene_id=3, target_id=1)
     block = env.step(hold(env))[4]["episode_metrics"]["shown_target_id"]
     if condition in ("zero", "random"):
@@ -79,11 +85,10 @@ def test_metrics_name_the_block_whose_mask_is_shown(condition):
     else:
         assert np.array_equal(env.renderer.block_pixels()[block], shown)
         assert (block == 1) == (condition == "correct")
-    env.close()
 
 
-def test_retargeting_changes_mask_target_and_metrics():
-    env = FR5GraspEnv(retarget_frame=30, episode_length=31)
+def test_retargeting_changes_mask_target_and_metrics(make):
+    env = make(retarget_frame=30, episode_length=31)
     first = start_mask(env, scene_id=3, target_id=1)
     for frame in range(1, 31):
         observation, *_, info = env.step(hold(env))
@@ -92,12 +97,11 @@ def test_retargeting_changes_mask_target_and_metrics():
     metrics = env.step(hold(env))[4]["episode_metrics"]
     assert metrics["commands"] == [[0, 1], [30, env.target_id]]
     assert metrics["retarget_frame"] == 30
-    env.close()
 
 
 @pytest.mark.parametrize(("shift_m", "is_seen"), [(0.05, True), (2.0, False)])
-def test_a_second_target_is_marked_where_it_lies_then_or_where_it_lay_if_out_of_sight(shift_m, is_seen):
-    env = FR5GraspEnv(retarget_frame=2)
+def test_a_second_target_is_marked_where_it_lies_then_or_where_it_lay_if_out_of_sight(make, shift_m, is_seen):
+    env = make(retarget_frame=2)
     env.reset(options={"scene_id": 3, "target_id": 1})
     start = env.renderer.block_pixels()
     env.step(hold(env))
@@ -107,7 +111,6 @@ def test_a_second_target_is_marked_where_it_lies_then_or_where_it_lay_if_out_of_
     places = env.renderer.block_pixels() if is_seen else start
     assert np.array_equal(mask, places[env.target_id])
     assert np.array_equal(mask, start[env.target_id]) != is_seen
-    env.close()
 
 
 def test_the_second_target_depends_on_scene_and_first_target_alone():
@@ -115,20 +118,20 @@ def test_the_second_target_depends_on_scene_and_first_target_alone():
         env.reset(options={"scene_id": scene_id, "target_id": 1})
         return env.step(action)[4]["target_id"]
 
-    env, other = (FR5GraspEnv(obs_type="agent_pos", retarget_frame=1) for _ in range(2))
+    env, other = (blind(retarget_frame=1) for _ in range(2))
     chosen = [second(env, scene_id, np.zeros(7)) for scene_id in range(12)]
     assert set(chosen) == {0, 2, 3}
     assert chosen[::-1] == [second(other, scene_id, np.ones(7)) for scene_id in reversed(range(12))]
 
 
 def test_a_schedule_goes_before_the_tasks_own_change():
-    env = FR5GraspEnv(obs_type="agent_pos", retarget_frame=1)
+    env = blind(retarget_frame=1)
     env.reset(options={"scene_id": 3, "target_id": 1, "commands": [(2, 0)]})
     assert [env.step(hold(env))[4]["target_id"] for _ in range(3)] == [1, 0, 0]
 
 
 def test_the_operator_succeeds_with_the_second_target():
-    env = FR5GraspEnv(obs_type="agent_pos", retarget_frame=30)
+    env = blind(retarget_frame=30)
     env.reset(seed=1)
     _, _, metrics = operate(env)
     assert metrics["is_success"]

@@ -1,16 +1,9 @@
 import mujoco
 import numpy as np
-import pytest
 
 from lerobot_excav.envs.machines.fr5.constants import JOINT_NAMES
-from lerobot_excav.envs.machines.fr5.workcell import Workcell
 from lerobot_excav.envs.tasks.grasp.nearest_block import grasp_pos_w, nearest_block
 from lerobot_excav.envs.tasks.grasp.scene import draw_scene
-
-
-@pytest.fixture(scope="module")
-def workcell():
-    return Workcell()
 
 
 def test_the_chain_of_frames_ends_where_the_simulated_gripper_is(workcell):
@@ -28,7 +21,5 @@ def test_the_nearest_block_is_nearest_to_the_gripper_in_the_plane(workcell):
         workcell.reset(scene)
         distance = np.linalg.norm(scene.block_pos_w[:, :2] - workcell.grasp_pos_w[:2], axis=1)
         assert nearest_block(scene) == np.argmin(distance)
-
-
-def test_no_block_is_always_the_nearest():
+    # None is always the nearest.
     assert {nearest_block(draw_scene("train", scene_id)) for scene_id in range(30)} == {0, 1, 2, 3}

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,21 +12,11 @@ OVER_BOX = TARGET_BOX.center_w + np.array([0.3, -0.2, 2.5])
 OVER_PILE = np.array([0.0, 0.0, 4.0])
 
 
-class SoilStandIn:
-    """Lets a test say what lies in the bucket and where loose parcels are."""
-
-    def __init__(self):
-        self.payload_mass_kg = 0.0
-        self.parcel_positions_w = np.zeros((0, 3))
-        self.parcel_is_load = np.zeros(0, dtype=bool)
-
-
-class WorksiteStandIn:
-    """A machine at rest over the pile, and soil and box as a test wants them."""
-
-    def __init__(self, worksite):
-        self.machine, self.tool = worksite.machine, worksite.tool
-        self.soil, self.box_mass_kg = SoilStandIn(), 0.0
+def parcels(*positions_w, is_load=False):
+    return {
+        "parcel_positions_w": np.array(positions_w).reshape(-1, 3),
+        "parcel_is_load": np.full(len(positions_w), is_load),
+    }
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +28,9 @@ def real_worksite():
 
 @pytest.fixture
 def site(real_worksite):
-    return WorksiteStandIn(real_worksite)
+    """A machine at rest over the pile, and soil and box as a test wants them."""
+    soil = SimpleNamespace(payload_mass_kg=0.0, **parcels())
+    return SimpleNamespace(machine=real_worksite.machine, tool=real_worksite.tool, soil=soil, box_mass_kg=0.0)
 
 
 @pytest.fixture
@@ -61,19 +55,15 @@ def test_a_cycle_is_complete_once_the_bucket_has_stayed_empty(cycle):
 
 
 def test_soil_that_still_falls_into_the_box_is_waited_for(cycle, site):
-    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_BOX[None], np.array([False])
+    vars(site.soil).update(parcels(OVER_BOX))
     assert not play(cycle, 2 * SETTLING_TICKS)
-    site.soil.parcel_positions_w, site.soil.parcel_is_load = np.zeros((0, 3)), np.zeros(0, dtype=bool)
+    vars(site.soil).update(parcels())
     assert play(cycle, SETTLING_TICKS)
 
 
-def test_soil_that_keeps_moving_elsewhere_is_not_waited_for(cycle, site):
-    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_PILE[None], np.array([False])
-    assert play(cycle, SETTLING_TICKS)
-
-
-def test_what_sticks_in_the_bucket_over_the_box_is_not_waited_for(cycle, site):
-    site.soil.parcel_positions_w, site.soil.parcel_is_load = OVER_BOX[None], np.array([True])
+@pytest.mark.parametrize(("place_w", "is_load"), [(OVER_PILE, False), (OVER_BOX, True)], ids=["elsewhere", "load"])
+def test_other_soil_is_not_waited_for(cycle, site, place_w, is_load):
+    vars(site.soil).update(parcels(place_w, is_load=is_load))
     assert play(cycle, SETTLING_TICKS)
 
 

@@ -1,29 +1,13 @@
 """The scripted operator: fetches any block of any scene by joint position targets."""
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.machines.fr5.workcell import Workcell
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.grasp.operator.inverse_kinematics import GripperKinematics
 from lerobot_excav.envs.tasks.grasp.operator.plan import PHASES, plan_grasp
 from lerobot_excav.envs.tasks.grasp.operator.variation import draw_variation
-
-
-class OperatedEnvironment(Protocol):
-    """What the operator looks at: the grasping environment, or anything with the same view of the work."""
-
-    fps: int
-
-    @property
-    def workcell(self) -> Workcell:
-        """Arm and blocks."""
-
-    @property
-    def target_id(self) -> int:
-        """Index of the commanded block."""
 
 
 class GraspOperator:
@@ -41,7 +25,7 @@ class GraspOperator:
         self._rng = rng
         self._kinematics = GripperKinematics()
 
-    def reset(self, env: OperatedEnvironment) -> None:
+    def reset(self, env: FR5GraspEnv) -> None:
         """Plan the grasp of the block that an environment commands now.
 
         Args:
@@ -54,7 +38,7 @@ class GraspOperator:
         self._plan = plan_grasp(start_pos_w, cell.block_pos_w[self._target_id], variation)
         self._ticks = 0
 
-    def act(self, env: OperatedEnvironment) -> NDArray[np.float32]:
+    def act(self, env: FR5GraspEnv) -> NDArray[np.float32]:
         """Return the action of the next frame: joint position targets [rad] and opening [0..1], (7,) float32.
 
         Args:

@@ -1,15 +1,13 @@
 """The scripted operator: digs any target of any scene through the four joysticks."""
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
 from lerobot_excav.envs.machines.excavator.kinematics import forward
 from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
-from lerobot_excav.envs.machines.excavator.worksite import Worksite
-from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, DigCycle
+from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, JointMotion, joint_pos_near
 from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_cut, plan_dump, plan_lift
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor, Variation, draw_variation
@@ -24,20 +22,6 @@ OVERTIME_S = 0.8
 """How long to wait for the machine after a motion should have ended [s], for instance when the bucket stalls."""
 FULL_KG = 500.0
 """Payload at which the cut is broken off [kg]."""
-
-
-class OperatedEnvironment(Protocol):
-    """What the operator looks at: the excavator environment, or anything with the same view of the work."""
-
-    fps: int
-
-    @property
-    def worksite(self) -> Worksite:
-        """Machine, soil and box."""
-
-    @property
-    def cycle(self) -> DigCycle:
-        """The running cycle, with the target that is commanded now."""
 
 
 class DigOperator:
@@ -55,7 +39,7 @@ class DigOperator:
         self._rng = rng
         self._phase = len(PHASES) - 1
 
-    def reset(self, env: OperatedEnvironment) -> None:
+    def reset(self, env: ExcavatorEnv) -> None:
         """Begin the running cycle of an environment with a newly drawn style."""
         self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
@@ -73,7 +57,7 @@ class DigOperator:
         """Whether the cycle is over and the operator rests."""
         return self.phase == "rest"
 
-    def act(self, env: OperatedEnvironment) -> NDArray[np.float32]:
+    def act(self, env: ExcavatorEnv) -> NDArray[np.float32]:
         """Return the joystick command for the next frame.
 
         Args:
@@ -99,7 +83,7 @@ class DigOperator:
         command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
         return np.asarray(command, dtype=np.float32)
 
-    def _begin(self, phase: int, env: OperatedEnvironment) -> None:
+    def _begin(self, phase: int, env: ExcavatorEnv) -> None:
         """Start a phase from where the machine is, after the style's pause."""
         self._phase = phase
         self._time_s = -self._variation.pauses_s[phase]
@@ -111,9 +95,9 @@ class DigOperator:
         """Plan the present phase's path from a joint position."""
         present = _bucket_pose(joint_pos)
         if self.phase == "reach":
-            return list(np.linspace(joint_pos, joint_pos_near(self._cut.above), 24))
+            return list(np.linspace(joint_pos, joint_pos_near(self._cut[0]), 24))
         if self.phase == "cut":
-            return [joint_pos, *(joint_pos_near(pose) for pose in self._cut.cut[1:])]
+            return [joint_pos, *(joint_pos_near(pose) for pose in self._cut[1:])]
         plans = {
             "curl": lambda: plan_curl(present),
             "lift": lambda: plan_lift(present),
@@ -122,7 +106,7 @@ class DigOperator:
         }
         return [joint_pos, *(joint_pos_near(pose, keep="pin") for pose in plans[self.phase]()[1:])]
 
-    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: OperatedEnvironment) -> bool:
+    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: ExcavatorEnv) -> bool:
         if self.done:
             return False
         payload_kg = env.worksite.soil.payload_mass_kg

@@ -6,11 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.excavator.constants import (
-    BUCKET_LENGTH_M,
-    JOINT_ACCEL_RAD_S2,
-    JOINT_SPEED_RAD_S,
-)
+from lerobot_excav.envs.machines.excavator.constants import BUCKET_LENGTH_M, JOINT_ACCEL_RAD_S2, JOINT_SPEED_RAD_S
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
 from lerobot_excav.errors import ExcavError
 

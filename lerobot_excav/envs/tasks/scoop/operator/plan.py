@@ -1,7 +1,5 @@
 """Planning of one cycle's bucket paths from the target and the terrain."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,26 +29,16 @@ DUMP_REACH_M = 0.1
 """How far the pin moves outwards while the bucket opens [m]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CutPlan:
-    """Where the edge goes through the soil.
-
-    Attributes:
-        above: Pose above the entry, out of the soil.
-        cut: Poses from above the entry to the end of the cut.
-    """
-
-    above: BucketPose
-    cut: list[BucketPose]
-
-
-def plan_cut(soil: Soil, target: Target, variation: Variation) -> CutPlan:
+def plan_cut(soil: Soil, target: Target, variation: Variation) -> list[BucketPose]:
     """Plan the cut: down into the patch, then towards the machine until the bucket has swept its fill.
 
     Args:
         soil: The soil as it lies.
         target: The commanded dig region.
         variation: Style of the cycle.
+
+    Returns:
+        Poses from above the entry, out of the soil, to the end of the cut.
     """
     radius, swing, _ = cylinder_from_world(target.center_w)
     entry_radius = radius + variation.entry_along_m
@@ -69,7 +57,7 @@ def plan_cut(soil: Soil, target: Target, variation: Variation) -> CutPlan:
         pitch_rad=variation.attack_pitch_rad,
         swing_rad=swing,
     )
-    return CutPlan(above=above, cut=[*line(above, cut[0], about_pin=False, samples=8), *cut[1:]])
+    return [*line(above, cut[0], about_pin=False, samples=8), *cut[1:]]
 
 
 def plan_curl(present: BucketPose) -> list[BucketPose]:

@@ -29,8 +29,7 @@ def soil(scene):
     return soil
 
 
-def variations(count=8):
-    return [draw_variation(np.random.default_rng(i), phase_count=7) for i in range(count)]
+VARIATIONS = [draw_variation(np.random.default_rng(i), phase_count=7) for i in range(8)]
 
 
 def test_cylinder_coordinates_round_trip():
@@ -44,8 +43,8 @@ def test_cylinder_coordinates_round_trip():
 @pytest.mark.parametrize("target_id", range(4))
 def test_cut_enters_inside_the_patch_and_never_touches_the_floor(scene, soil, target_id):
     target = scene.targets[target_id]
-    for variation in variations():
-        cut = plan_cut(soil, target, variation).cut
+    for variation in VARIATIONS:
+        cut = plan_cut(soil, target, variation)
         points_w = np.array([[*world_from_cylinder(p.radius_m, p.swing_rad), p.height_m] for p in cut])
         below = points_w[:, 2] < soil.height_at(points_w[:, :2])
         first = int(np.argmax(below))
@@ -55,7 +54,7 @@ def test_cut_enters_inside_the_patch_and_never_touches_the_floor(scene, soil, ta
 
 
 def test_cut_goes_towards_the_machine_and_rolls_in(scene, soil):
-    cut = plan_cut(soil, scene.targets[0], variations()[0]).cut
+    cut = plan_cut(soil, scene.targets[0], VARIATIONS[0])
     radii, pitches = [p.radius_m for p in cut], [p.pitch_rad for p in cut]
     assert np.all(np.diff(radii) <= 1e-9)
     assert pitches[-1] < pitches[0]
@@ -64,15 +63,15 @@ def test_cut_goes_towards_the_machine_and_rolls_in(scene, soil):
 def test_deeper_style_cuts_deeper_where_there_is_soil():
     soil = Soil(cell_size_m=SOIL_CELL_SIZE_M)
     soil.reset(np.ones_like(soil.heights_m))
-    target, style = Target(center_w=np.array([0.5, 0.0, 1.0]), yaw_rad=0.0), variations()[0]
+    target, style = Target(center_w=np.array([0.5, 0.0, 1.0]), yaw_rad=0.0), VARIATIONS[0]
     depths = [0.3, 0.4]
-    cuts = [plan_cut(soil, target, dataclasses.replace(style, depth_m=depth)).cut for depth in depths]
+    cuts = [plan_cut(soil, target, dataclasses.replace(style, depth_m=depth)) for depth in depths]
     lowest = [min(pose.height_m for pose in cut) for cut in cuts]
     assert lowest == pytest.approx([0.7, 0.6])
 
 
 def test_load_is_carried_level_over_the_wall_and_dumped_over_the_box():
-    style = variations()[0]
+    style = VARIATIONS[0]
     start = BucketPose.of_pin(radius_m=4.0, height_m=1.9, pitch_rad=-3.0, swing_rad=0.0)
     carry = plan_carry(start, style)
     assert all(p.pitch_rad == pytest.approx(-3.0) for p in carry)
