@@ -27,7 +27,7 @@ from validation.soil import catalogue
 from validation.soil.experiment import Conditions
 from validation.soil.report import Outcome, summary_text, write_report
 
-REPORT = Path("docs", "soil_validation.md")
+REPORT = Path("docs", "explanation", "soil_validation.md")
 
 
 def _parser() -> argparse.ArgumentParser:
