@@ -239,8 +239,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         if info.get("mask_missing"):
             raise MaskMissingError(
                 f"robot.mask_source={self.settings.mask_source!r} finds nothing for target {info['target_id']} of "
-                f"scene {self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; begin "
-                "with another --robot.scene_id or --robot.target_id, choose larger pictures or another source."
+                f"scene {self.scene_id} ({self.settings.scene_set}), so the machine would be driven without a target; "
+                "begin with another --robot.scene_id or --robot.target_id, choose larger pictures or another source."
             )
 
 
