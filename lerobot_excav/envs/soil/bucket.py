@@ -139,12 +139,7 @@ class Bucket:
         return points, masses
 
     def _sweep(
-        self,
-        geometry: ToolGeometry,
-        path: Iterator[tuple[Pose, Pose]],
-        field: HeightField,
-        intake: Intake,
-        room: float,
+        self, geometry: ToolGeometry, path: Iterator[tuple[Pose, Pose]], field: HeightField, intake: Intake, room: float
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
         for start, end in path:
@@ -168,13 +163,7 @@ class Bucket:
         """Let the underside of the bucket hold avalanches back."""
         window = field.window(pose.place(geometry.corners_t))
         set_ceiling(
-            field.heights,
-            field.active,
-            field.ceiling,
-            field.grid,
-            geometry.planes_t,
-            *pose,
-            window.union(self._window),
+            field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, *pose, window.union(self._window)
         )
         field.wake()
         self._window = window

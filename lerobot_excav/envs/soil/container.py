@@ -40,8 +40,7 @@ class Container:
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         require(
-            bool((self.half_extent_m > 0).all()),
-            f"container half_extent_m={self.half_extent_m}; allowed: above 0.",
+            bool((self.half_extent_m > 0).all()), f"container half_extent_m={self.half_extent_m}; allowed: above 0."
         )
         require(
             0 < self.wall_height_m < math.inf,

@@ -128,11 +128,7 @@ def _level_unit(rotation: Array, vector: tuple[float, float, float]) -> tuple[fl
 
 @kernel
 def push_direction(
-    planes: Array,
-    rotation: Array,
-    face: int,
-    before: tuple[float, float, float],
-    now: tuple[float, float, float],
+    planes: Array, rotation: Array, face: int, before: tuple[float, float, float], now: tuple[float, float, float]
 ) -> tuple[float, float]:
     """Return the level unit direction in which soil is pushed aside.
 
@@ -189,15 +185,7 @@ def cut_column(
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
             lost += push_aside(
-                heights,
-                active,
-                grid,
-                planes,
-                pose_now.position,
-                pose_now.rotation,
-                (x, y),
-                direction,
-                share - taken,
+                heights, active, grid, planes, pose_now.position, pose_now.rotation, (x, y), direction, share - taken
             )
     return entered, lost
 
@@ -237,17 +225,7 @@ def cut(
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights,
-                    active,
-                    grid,
-                    planes,
-                    pose_before,
-                    pose_now,
-                    i,
-                    j,
-                    samples,
-                    room - entered,
-                    intake,
+                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
                 )
                 entered += more
                 lost += over

@@ -26,11 +26,7 @@ Array = NDArray[np.float64]
 def bearing_factors(friction_rad: float) -> tuple[float, float, float]:
     """Return the bearing capacity factors of cohesion, depth and width (Prandtl-Reissner, Vesic 1973)."""
     depth = math.exp(math.pi * math.tan(friction_rad)) * math.tan(math.pi / 4 + friction_rad / 2) ** 2
-    return (
-        (depth - 1.0) / math.tan(friction_rad),
-        depth,
-        2.0 * (depth + 1.0) * math.tan(friction_rad),
-    )
+    return ((depth - 1.0) / math.tan(friction_rad), depth, 2.0 * (depth + 1.0) * math.tan(friction_rad))
 
 
 def soil_strength(parameters: SoilParameters) -> SoilStrength:

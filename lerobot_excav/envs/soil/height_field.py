@@ -163,12 +163,10 @@ class HeightField:
         new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
         require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
         require(
-            bool(np.isfinite(new).all()),
-            "heights_m holds values that are not finite; give metres above the floor.",
+            bool(np.isfinite(new).all()), "heights_m holds values that are not finite; give metres above the floor."
         )
         require(
-            bool((new >= 0).all()),
-            f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.",
+            bool((new >= 0).all()), f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor."
         )
         self.heights[:] = new
         self.active[:] = 1
@@ -215,13 +213,7 @@ class HeightField:
             if self._at_rest:
                 break
             over, changed = sweep(
-                self.heights,
-                self._delta,
-                self.active,
-                self.ceiling,
-                self.grid.cell_m,
-                slope_tan,
-                self._border_height_m,
+                self.heights, self._delta, self.active, self.ceiling, self.grid.cell_m, slope_tan, self._border_height_m
             )
             lost += over
             self._at_rest = changed == 0

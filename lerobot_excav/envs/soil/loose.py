@@ -101,13 +101,7 @@ class LooseSoil:
         self._tool = ToolPath(0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3))
 
     def step(
-        self,
-        geometry: ToolGeometry | None,
-        before: Pose | None,
-        now: Pose | None,
-        dt_s: float,
-        *,
-        cutting: bool,
+        self, geometry: ToolGeometry | None, before: Pose | None, now: Pose | None, dt_s: float, *, cutting: bool
     ) -> float:
         """Move the parcels along with the bucket and let those at rest become ground.
 

@@ -122,13 +122,7 @@ class Patches:
 
 @kernel
 def patch_wrench(
-    points: Array,
-    normals: Array,
-    limits: Array,
-    frictions: Array,
-    origin: Array,
-    linear: Array,
-    angular: Array,
+    points: Array, normals: Array, limits: Array, frictions: Array, origin: Array, linear: Array, angular: Array
 ) -> tuple[Array, Array]:
     """Add up the forces of patches on a moving tool; arguments and result as in `Patches.wrench`."""
     force, torque = np.zeros(3), np.zeros(3)

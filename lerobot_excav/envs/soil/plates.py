@@ -39,10 +39,7 @@ class OuterFaces:
         shell, sides = _shell_samples(geometry, rows), _side_samples(geometry)
         points, normals, areas, breadths = (np.concatenate(pair) for pair in zip(shell, sides, strict=True))
         return cls(
-            points_t=points + PLATE_THICKNESS_M * normals,
-            normals_t=normals,
-            areas_m2=areas,
-            breadths_m=breadths,
+            points_t=points + PLATE_THICKNESS_M * normals, normals_t=normals, areas_m2=areas, breadths_m=breadths
         )
 
 

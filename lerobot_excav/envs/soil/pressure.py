@@ -69,14 +69,8 @@ def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
         x, y = points[k, 0], points[k, 1]
         level = surface_height(heights, grid, x, y)
         lowest = min(
-            min(
-                surface_height(heights, grid, x - FALL_REACH_M, y),
-                surface_height(heights, grid, x + FALL_REACH_M, y),
-            ),
-            min(
-                surface_height(heights, grid, x, y - FALL_REACH_M),
-                surface_height(heights, grid, x, y + FALL_REACH_M),
-            ),
+            min(surface_height(heights, grid, x - FALL_REACH_M, y), surface_height(heights, grid, x + FALL_REACH_M, y)),
+            min(surface_height(heights, grid, x, y - FALL_REACH_M), surface_height(heights, grid, x, y + FALL_REACH_M)),
         )
         slope = min(max((level - lowest) / FALL_REACH_M, 0.0), 1.0)
         factors[k] = (1.0 - slope) ** 2

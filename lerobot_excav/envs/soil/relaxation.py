@@ -145,8 +145,7 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
         "heights_m has values that are not finite or below 0.",
     )
     require(
-        cell_size_m > 0 and slope_tan > 0,
-        f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0.",
+        cell_size_m > 0 and slope_tan > 0, f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0."
     )
     delta = np.zeros_like(heights)
     active = np.ones(heights.shape, dtype=np.uint8)

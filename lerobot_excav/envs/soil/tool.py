@@ -47,8 +47,7 @@ class ToolGeometry:
         )
         object.__setattr__(self, "profile_t", _fixed(points, points.shape, "profile_t"))
         require(
-            0.0 < self.inner_width_m < np.inf,
-            f"inner_width_m={self.inner_width_m!r}; allowed: above 0 and finite.",
+            0.0 < self.inner_width_m < np.inf, f"inner_width_m={self.inner_width_m!r}; allowed: above 0 and finite."
         )
         require(bool((points[:, 1] >= -1e-9).all()), "profile_t has z_t < 0; the shell lies on the +z side.")
         side = np.roll(points, -1, axis=0) - points

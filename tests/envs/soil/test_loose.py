@@ -57,13 +57,7 @@ def test_a_parcel_above_the_wall_flies_over_it():
     assert soil.ledger_kg()["box"] == pytest.approx(soil.parcel_mass_kg)
 
 
-@given(
-    x=st.floats(3.0, 7.0),
-    y=st.floats(-2.0, 3.0),
-    vx=st.floats(-9, 9),
-    vy=st.floats(-9, 9),
-    z=st.floats(0.3, 2.0),
-)
+@given(x=st.floats(3.0, 7.0), y=st.floats(-2.0, 3.0), vx=st.floats(-9, 9), vy=st.floats(-9, 9), z=st.floats(0.3, 2.0))
 @settings(max_examples=60)
 def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
     soil = Soil(container=TILTED)

@@ -29,12 +29,7 @@ def steepest(heights, cell):
     return float(max(slopes))
 
 
-@given(
-    heights=small_fields,
-    ceiling=ceilings,
-    border=st.sampled_from([0.0, 0.3, math.inf]),
-    wide=st.floats(0.03, 0.08),
-)
+@given(heights=small_fields, ceiling=ceilings, border=st.sampled_from([0.0, 0.3, math.inf]), wide=st.floats(0.03, 0.08))
 @settings(max_examples=60)
 def test_a_sweep_is_the_reference_sweep(heights, ceiling, border, wide):
     expected, expected_over = avalanche.sweep(heights, ceiling, (CELL, wide), SLOPE, border)

@@ -23,12 +23,7 @@ def trace(soil, tools):
     marks = []
     for tool in tools:
         reaction = soil.step(TICK_S, tool)
-        numbers = [
-            *soil.ledger_kg().values(),
-            *reaction.force_w_n,
-            *reaction.torque_w_nm,
-            *reaction.payload_com_t,
-        ]
+        numbers = [*soil.ledger_kg().values(), *reaction.force_w_n, *reaction.torque_w_nm, *reaction.payload_com_t]
         marks.append(np.array(numbers).tobytes() + soil.parcel_positions_w.tobytes())
     return [*marks, soil.heights_m.tobytes()]
 

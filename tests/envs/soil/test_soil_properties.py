@@ -26,20 +26,11 @@ seeds = st.integers(0, 2**32 - 1)
 
 def random_soil(preset, fidelity, rng, floor_depth_m):
     box = Container(
-        center_w=np.array([-2.4, 0.0, 0.0]),
-        half_extent_m=np.array([0.6, 0.6]),
-        wall_height_m=0.4,
-        yaw_rad=0.2,
+        center_w=np.array([-2.4, 0.0, 0.0]), half_extent_m=np.array([0.6, 0.6]), wall_height_m=0.4, yaw_rad=0.2
     )
     shape = (round(EXTENT_M / CELL_M),) * 2
     soil = Soil(
-        preset,
-        (EXTENT_M, EXTENT_M),
-        CELL_M,
-        fidelity,
-        int(rng.integers(1000)),
-        box,
-        floor_depth_m=floor_depth_m,
+        preset, (EXTENT_M, EXTENT_M), CELL_M, fidelity, int(rng.integers(1000)), box, floor_depth_m=floor_depth_m
     )
     x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
     pile = np.clip(rng.uniform(0.4, 1.1) - rng.uniform(0.2, 0.8) * np.hypot(x, y), 0.0, None)
@@ -50,10 +41,7 @@ def random_soil(preset, fidelity, rng, floor_depth_m):
 def swung(tool, yaw_rad, yaw_rate):
     """Turn a tool about the world's z axis."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    turn, spin = (
-        np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]),
-        np.array([0.0, 0.0, yaw_rate]),
-    )
+    turn, spin = (np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, yaw_rate]))
     position = turn @ tool.position_w
     return Tool(
         geometry=tool.geometry,
@@ -119,12 +107,7 @@ def assert_sound(soil, total):
     assert soil.heights_m.min() >= 0.0
     assert soil.container_heights_m.min() >= 0.0
     assert (soil.parcel_masses_kg > 0.0).all()
-    for values in (
-        soil.heights_m,
-        soil.container_heights_m,
-        soil.parcel_positions_w,
-        soil.parcel_velocities_w,
-    ):
+    for values in (soil.heights_m, soil.container_heights_m, soil.parcel_positions_w, soil.parcel_velocities_w):
         assert np.isfinite(values).all()
     assert math.isfinite(soil.mechanical_energy_j())
 

@@ -6,13 +6,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site
-from lerobot_excav.envs.soil.parcels.store import (
-    SHELTERED,
-    TOUCHES_BOX_FLOOR,
-    TOUCHES_GROUND,
-    TOUCHES_OUTSIDE,
-    State,
-)
+from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 from validation.soil.reference.contact import wall_contact
 
 Array = NDArray[np.float64]
@@ -67,15 +61,7 @@ def press_ground(state: State, site: Site, law: Law, dt: float) -> None:
         if not state.near_plate[i]:
             state.positions[i] += float(np.clip(LEAST_GAP * radius - gap, 0.0, LIFT * radius)) * normal
         force, torque = wall_contact(
-            springs,
-            normal,
-            max(gap, 0.0),
-            state.velocities[i],
-            state.spins[i],
-            float(state.masses[i]),
-            radius,
-            law,
-            dt,
+            springs, normal, max(gap, 0.0), state.velocities[i], state.spins[i], float(state.masses[i]), radius, law, dt
         )
         state.forces[i] += force
         state.torques[i] += torque

@@ -104,15 +104,7 @@ def _press(state: State, i: int, plate: int, away: Array, velocity: Array, law: 
     state.positions[i] += back * normal
     state.velocities[i] += max(0.0, closing - LARGEST_APPROACH * (gap + back) / dt) * normal
     force, torque = wall_contact(
-        springs,
-        normal,
-        gap,
-        state.velocities[i] - velocity,
-        state.spins[i],
-        float(state.masses[i]),
-        radius,
-        law,
-        dt,
+        springs, normal, gap, state.velocities[i] - velocity, state.spins[i], float(state.masses[i]), radius, law, dt
     )
     state.forces[i] += force
     state.torques[i] += torque

@@ -95,10 +95,7 @@ class Intake:
         self._edge, self._lip = geometry.profile_t[0], geometry.profile_t[-1]
         across = self._lip - self._edge
         length = float(np.linalg.norm(across))
-        shape = (
-            max(1, round(length / (2 * radius_m))),
-            max(1, round(geometry.inner_width_m / (2 * radius_m))),
-        )
+        shape = (max(1, round(length / (2 * radius_m))), max(1, round(geometry.inner_width_m / (2 * radius_m))))
         (x, z), (along_x, along_z) = self._edge.tolist(), (across / length**2).tolist()
         self.bins = Bins(np.zeros(shape), x, z, along_x, along_z, float(geometry.inner_width_m))
 

@@ -116,21 +116,13 @@ def spring_force(
         dt: Duration [s].
     """
     along = dot(velocity, normal)
-    v0, v1, v2 = (
-        velocity[0] - along * normal[0],
-        velocity[1] - along * normal[1],
-        velocity[2] - along * normal[2],
-    )
+    v0, v1, v2 = (velocity[0] - along * normal[0], velocity[1] - along * normal[1], velocity[2] - along * normal[2])
     s0, s1, s2 = springs[row, first], springs[row, first + 1], springs[row, first + 2]
     along = s0 * normal[0] + s1 * normal[1] + s2 * normal[2]
     s0 += v0 * dt - along * normal[0]
     s1 += v1 * dt - along * normal[1]
     s2 += v2 * dt - along * normal[2]
-    f0, f1, f2 = (
-        -stiffness * s0 - damping * v0,
-        -stiffness * s1 - damping * v1,
-        -stiffness * s2 - damping * v2,
-    )
+    f0, f1, f2 = (-stiffness * s0 - damping * v0, -stiffness * s1 - damping * v1, -stiffness * s2 - damping * v2)
     square = f0 * f0 + f1 * f1 + f2 * f2
     if square > limit * limit:  # it slides: the spring keeps the stretch that friction can hold
         share = limit / math.sqrt(square)

@@ -10,13 +10,7 @@ from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
 from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls, to_box
-from lerobot_excav.envs.soil.parcels.store import (
-    SHELTERED,
-    TOUCHES_BOX_FLOOR,
-    TOUCHES_GROUND,
-    TOUCHES_OUTSIDE,
-    State,
-)
+from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 
 Array = NDArray[np.float64]
 

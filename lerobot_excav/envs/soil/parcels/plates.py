@@ -128,14 +128,7 @@ def nearest_on_plate(profile: Array, planes: Array, half_width: float, plate: in
 
 @kernel
 def keep_out(
-    positions: Array,
-    velocities: Array,
-    i: int,
-    normal: Vector,
-    gap: float,
-    radius: float,
-    velocity: Vector,
-    dt: float,
+    positions: Array, velocities: Array, i: int, normal: Vector, gap: float, radius: float, velocity: Vector, dt: float
 ) -> Vector:
     """Put a parcel that came too near to a plate back, and take the speed with which it would pass through.
 
@@ -157,11 +150,7 @@ def keep_out(
     for a in range(3):
         positions[i, a] += back * normal[a]
         velocities[i, a] += excess * normal[a]
-    return (
-        velocity[0] + excess * normal[0],
-        velocity[1] + excess * normal[1],
-        velocity[2] + excess * normal[2],
-    )
+    return (velocity[0] + excess * normal[0], velocity[1] + excess * normal[1], velocity[2] + excess * normal[2])
 
 
 @kernel

@@ -209,11 +209,7 @@ class Population:
         caught = (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
         at_rest = state.calm_s >= SETTLING_TIME_S
         gone = grounded & (caught | at_rest | (state.ground == TOUCHES_OUTSIDE))
-        landed = Landed(
-            points_w=state.positions[gone, :2],
-            masses_kg=state.masses[gone],
-            place=state.ground[gone],
-        )
+        landed = Landed(points_w=state.positions[gone, :2], masses_kg=state.masses[gone], place=state.ground[gone])
         if len(landed.masses_kg):
             self.state = rows(self._all, keep(state, (~gone).astype(np.uint8)))
             self._rows = self._rows[~gone]

@@ -101,12 +101,7 @@ def site():
         inside = np.zeros((8, 6)) if box_heights is None else box_heights
         size = 2.0 * box.half_x / inside.shape[0], 2.0 * box.half_y / inside.shape[1]
         return Site(
-            cells,
-            Grid.centred(cells.shape, cell, cell),
-            inside,
-            Grid.centred(inside.shape, *size),
-            box,
-            height,
+            cells, Grid.centred(cells.shape, cell, cell), inside, Grid.centred(inside.shape, *size), box, height
         )
 
     return make

@@ -42,10 +42,7 @@ def test_bins_are_about_as_wide_as_a_parcel():
     assert Intake(BUCKET, 10.0).bins.volumes.shape == (1, 1)
 
 
-@given(
-    entries=st.lists(st.tuples(points, st.floats(0.0, 3e-3)), min_size=1, max_size=30),
-    seed=st.integers(0, 99),
-)
+@given(entries=st.lists(st.tuples(points, st.floats(0.0, 3e-3)), min_size=1, max_size=30), seed=st.integers(0, 99))
 @settings(max_examples=60)
 def test_whole_parcels_leave_and_less_than_one_waits(entries, seed):
     intake = Intake(BUCKET, RADIUS)

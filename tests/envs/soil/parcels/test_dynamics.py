@@ -233,8 +233,7 @@ def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, ru
     keep = [min(np.linalg.norm(q - nearest_point(plate, q)) for plate in plates) > 0.5 * RADIUS for q in starts]
     rotation = whole.rotations[0]
     state = make_state(
-        whole.positions[0] + starts[keep] @ rotation.T,
-        velocities=LARGEST_SPEED_M_S * flight[keep] @ rotation.T,
+        whole.positions[0] + starts[keep] @ rotation.T, velocities=LARGEST_SPEED_M_S * flight[keep] @ rotation.T
     )
     for step in range(steps):
         tool = whole._replace(positions=whole.positions[step : step + 2], rotations=whole.rotations[:2])

@@ -7,13 +7,7 @@ from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, ground_below, press_ground
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls
-from lerobot_excav.envs.soil.parcels.store import (
-    SHELTERED,
-    TOUCHES_BOX_FLOOR,
-    TOUCHES_GROUND,
-    TOUCHES_OUTSIDE,
-    State,
-)
+from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 from validation.soil.reference import ground as reference
 
 RADIUS = 0.045

@@ -179,13 +179,7 @@ def test_the_rest_must_not_be_interrupted(make_population):
 def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
     population = make_population()
     add(population, np.arange(15.0).reshape(5, 3), masses=MASS * np.arange(1.0, 6.0))
-    population.state.ground[:] = [
-        TOUCHES_OUTSIDE,
-        TOUCHES_NOTHING,
-        TOUCHES_BOX_FLOOR,
-        TOUCHES_GROUND,
-        TOUCHES_NOTHING,
-    ]
+    population.state.ground[:] = [TOUCHES_OUTSIDE, TOUCHES_NOTHING, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_NOTHING]
     population.state.calm_s[:] = SETTLING_TIME_S
     landed = population.settle(NO_GROUND, TICK_S)
     np.testing.assert_array_equal(landed.points_w, [[0.0, 1.0], [6.0, 7.0], [9.0, 10.0]])
