@@ -8,9 +8,9 @@ motion: that decides how much of them acts, see `patches`.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parameters import SoilParameters
@@ -19,8 +19,6 @@ from lerobot_excav.envs.soil.plates import OuterFaces
 from lerobot_excav.envs.soil.pressure import PlatePressure
 from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
 from lerobot_excav.envs.soil.wedge import SoilStrength, edge_limits
-
-Array = NDArray[np.float64]
 
 
 def bearing_factors(friction_rad: float) -> tuple[float, float, float]:

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField
@@ -18,8 +18,6 @@ from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Landed, Population
 from lerobot_excav.envs.soil.parcels.store import WALLS
 from lerobot_excav.envs.soil.tool import ToolGeometry
-
-Array = NDArray[np.float64]
 
 _PHASE_PER_SUBSTEP = 0.2
 """Phase of a parcel on its contact spring per sub-step [rad] (tuned: stable up to a dozen contacts)."""

@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.tool import ToolGeometry
-
-Array = NDArray[np.float64]
 
 PLATE_THICKNESS_M = 0.02
 """Thickness of the plates (guess: wear plate with its strips)."""

@@ -13,16 +13,14 @@ plate: the cut clears the inside of the plates, so soil that touches one reaches
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.tool import Tool
 from lerobot_excav.envs.soil.wedge import SoilStrength, table_row
-
-Array = NDArray[np.float64]
 
 SINKAGE_MODULUS = 1.53e6
 """Pressure at 1 m of sinkage [N/m^(n+2)] of a plate in dry sand; the part that depends on its breadth is below 1 %
@@ -37,15 +35,9 @@ FALL_REACH_M = 0.5
 
 @kernel
 def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) -> Array:
-    """Return how far the soil before each sample of the outer faces stands above it [m], at least 0.
+    """Return how far the soil before each of (m, 3) samples of the outer faces stands above it [m], at least 0.
 
-    It is read one cell outside of the face, in so far as the face is upright.
-
-    Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        points: (m, 3) samples; z above the rigid floor.
-        normals: (m, 3) unit vectors out of the bucket.
+    It is read one cell outside of the face, in so far as the face is upright; z counts from the rigid floor.
     """
     overlaps = np.zeros(len(points))
     for k in range(len(points)):
@@ -57,13 +49,7 @@ def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) ->
 
 @kernel
 def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
-    """Return the share of the bearing that is left on ground that falls off towards one side, (m,).
-
-    Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        points: (m, 3) where the ground bears.
-    """
+    """Return the share of the bearing that is left at (m, 3) points on ground that falls off towards one side, (m,)."""
     factors = np.ones(len(points))
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.errors import require
-
-Array = NDArray[np.float64]
 
 _CONVEX_TOLERANCE_M2 = 1e-9
 

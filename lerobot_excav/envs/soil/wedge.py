@@ -7,13 +7,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
-
-Array = NDArray[np.float64]
 
 EDGE_THICKNESS_M = 0.02
 """Thickness of the cutting edge (guess, typical of 8-t buckets)."""

@@ -3,11 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.relaxation import FLOW_FRACTION, REST_TAN
-
-Array = NDArray[np.float64]
 
 
 def sweep(

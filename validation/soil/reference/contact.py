@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
     LARGEST_PHASE,
@@ -15,8 +15,6 @@ from lerobot_excav.envs.soil.parcels.contact import (
     TANGENTIAL_STIFFNESS,
     Law,
 )
-
-Array = NDArray[np.float64]
 
 
 def normal_force(overlap: float, separation_speed: float, stiffness: float, mass: float, radius: float) -> float:

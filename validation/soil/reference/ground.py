@@ -1,15 +1,13 @@
 """Twin of `parcels.ground`: the bilinear surface as a sum over its corners."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site
 from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 from validation.soil.reference.contact import wall_contact
-
-Array = NDArray[np.float64]
 
 
 def surface(heights: Array, grid: Grid, point: Array) -> tuple[float, Array]:

@@ -1,12 +1,10 @@
 """Twin of `parcels.load`: which parcels a bucket carries."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.load import LARGEST_HEAP_M, LEAVING_M_S, LOOKS_UP
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
-
-Array = NDArray[np.float64]
 
 
 def is_load(tool: ToolPath, position: Array, velocity: Array, radius: float) -> bool:

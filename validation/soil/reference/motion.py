@@ -1,7 +1,6 @@
 """Twin of `parcels.dynamics`: one whole sub-step."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, Laws
@@ -11,8 +10,6 @@ from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, S
 from validation.soil.reference.ground import press_ground
 from validation.soil.reference.pairs import Memory, press_pairs
 from validation.soil.reference.plates import press_box, press_bucket
-
-Array = NDArray[np.float64]
 
 
 def carry(state: State, tool: ToolPath, step: int) -> None:

@@ -1,14 +1,12 @@
 """Twin of `parcels.plates`: a sphere against thin plates, each a convex polygon in space."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 from validation.soil.reference.contact import wall_contact
-
-Array = NDArray[np.float64]
 
 _DEEP_M = 100.0
 """How far box walls reach down: parcels below the floor of the box meet them too."""

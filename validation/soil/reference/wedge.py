@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from lerobot_excav.envs.soil.arrays import Array
 
 
 def wedge_area(depths: Array, spacing_m: float, failure: float) -> float:

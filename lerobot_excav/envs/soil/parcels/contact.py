@@ -10,12 +10,9 @@ makes in one sub-step, before it can fade.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 SPRINGS = 6
@@ -197,17 +194,8 @@ def wall_contact(
 ) -> tuple[Vector, Vector]:
     """Return force [N] and torque [N m] on a parcel that touches something that it does not move.
 
-    Args:
-        springs: (n, 6) memories of contacts [m], changed in place.
-        row: Which contact.
-        normal: Unit normal towards the parcel.
-        gap: Distance of the parcel's centre from the wall, below its radius [m].
-        velocity: Of its centre relative to the wall [m/s].
-        spin: Its angular velocity [rad/s].
-        mass: Its mass [kg].
-        radius: Its radius [m].
-        law: Coefficients.
-        dt: Duration [s].
+    Its centre has a distance `gap` [m] below its radius, a velocity relative to the wall [m/s] and a spin [rad/s]; the
+    other arguments are as in `contact`.
     """
     arm = (-gap * normal[0], -gap * normal[1], -gap * normal[2])
     turning = cross(spin, arm)
