@@ -1,6 +1,7 @@
 """Small worlds of parcels: makers of states, tools and sites for the tests of this directory."""
 
 import math
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -105,6 +106,34 @@ def site():
         )
 
     return make
+
+
+@pytest.fixture(scope="session")
+def assert_same():
+    """Return what compares fields of two states, flags exactly."""
+
+    def check(state, twin, *names):
+        for name in names:
+            np.testing.assert_allclose(getattr(state, name), getattr(twin, name), rtol=1e-9, atol=1e-9, err_msg=name)
+
+    return check
+
+
+@pytest.fixture(scope="session")
+def press_both(assert_same):
+    """Return what lets a kernel and its twin press on parcels that fly on: springs stretch, contacts open."""
+
+    def press(state, kernel, reference, *names, times=5):
+        twin = deepcopy(state)
+        for step in range(times):
+            for parcels, act in ((state, kernel), (twin, reference)):
+                parcels.forces[:] = 0.0
+                parcels.torques[:] = 0.0
+                parcels.positions[:] += 0.004 * parcels.velocities
+                act(parcels, step)
+            assert_same(state, twin, "positions", "velocities", "forces", "torques", *names)
+
+    return press
 
 
 @pytest.fixture(scope="session")
