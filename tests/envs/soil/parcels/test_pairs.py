@@ -1,3 +1,5 @@
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,7 +7,6 @@ from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.parcels.dynamics import press_pairs
 from lerobot_excav.envs.soil.parcels.pairs import SKIN, enlarged, find_pairs, is_outdated, room_for
-from lerobot_excav.envs.soil.parcels.store import State
 from validation.soil.reference import pairs as reference
 
 RADIUS = 0.045
@@ -54,7 +55,7 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state,
     rng = np.random.default_rng(seed)
     state = random_state(rng, 12, 0.12)
     state.asleep[:] = rng.random(12) < 0.3
-    twin, memory = State(*(array.copy() for array in state)), {}
+    twin, memory = deepcopy(state), {}
     pairs = first_list(state)
     law = laws.parcel._replace(cohesion=float(rng.choice([0.0, 2100.0])))
     for _ in range(4):  # contacts open and close while the parcels are shaken

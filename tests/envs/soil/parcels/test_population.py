@@ -20,7 +20,6 @@ from lerobot_excav.envs.soil.parcels.store import (
     TOUCHES_GROUND,
     TOUCHES_NOTHING,
     TOUCHES_OUTSIDE,
-    State,
 )
 from validation.soil.reference import motion as reference
 
@@ -35,10 +34,6 @@ def add(population, positions, velocities=None, masses=None):
     points = np.asarray(positions, dtype=np.float64)
     moving = np.zeros_like(points) if velocities is None else np.asarray(velocities, dtype=np.float64)
     population.add(points, moving, np.full(len(points), MASS) if masses is None else np.asarray(masses))
-
-
-def copy(state):
-    return State(*(array.copy() for array in state))
 
 
 @given(seed=st.integers(0, 2**16))
@@ -78,32 +73,31 @@ def fallen(population, tool, site, ticks, rng):
     return landed
 
 
-def test_growing_beyond_the_first_room_changes_nothing(monkeypatch, make_population, no_tool, site):
+def bits(population, landed):
+    parts = [array for one in landed for array in (one.points_w, one.masses_kg)]
+    return [array.tobytes() for array in (*population.state, *parts)]
+
+
+def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch, make_population, no_tool, site):
     runs = []
     for capacity in (3, 17, 1024):
         monkeypatch.setattr(module, "_FIRST_CAPACITY", capacity)
         population = make_population()
-        landed = fallen(population, no_tool(STEPS), site(), 40, np.random.default_rng(0))
-        runs.append(
-            [array.tobytes() for array in population.state]
-            + [part.points_w.tobytes() + part.masses_kg.tobytes() for part in landed]
-        )
-        assert len(population.state.masses) > 17
-        assert sum(len(part.masses_kg) for part in landed) > 10
-    assert runs[0] == runs[1] == runs[2]
-
-
-def without(memory, gone):
-    """Return the memory of pairs with the rows that stay after some have left."""
-    rows = np.cumsum(~gone) - 1
-    return {(int(rows[i]), int(rows[j])): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
+        for _ in range(2):
+            landed = fallen(population, no_tool(STEPS), site(), 40, np.random.default_rng(0))
+            runs.append(bits(population, landed))
+            assert len(population.state.masses) > 17
+            assert sum(len(part.masses_kg) for part in landed) > 10
+            population.clear()
+            assert len(population.state.masses) == population.awake_count == 0
+    assert all(run == runs[0] for run in runs)
 
 
 def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_population, no_tool, site, laws):
     """Sticky lumps beyond the border: what touches the ground there leaves at once, new parcels join above."""
     sticky = laws._replace(parcel=laws.parcel._replace(cohesion=1e4))
     population, memory = make_population(laws=sticky), {}
-    lump = 1.97 * RADIUS * np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    lump = 1.97 * RADIUS * np.array(list(np.ndindex(2, 2, 2)))
     place, rng = np.array([4.0, 0.0, 0.12]), np.random.default_rng(1)
     left = joined = 0
     for tick in range(16):
@@ -111,33 +105,19 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_popu
             start = lump + place + [0.0, 0.0, 0.05 * tick]
             add(population, start, rng.normal(0.0, 0.05, (8, 3)))
             joined += tick > 0
-        twin = copy(population.state)
+        twin = deepcopy(population.state)
         population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
         reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS)
         np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
-        touching = population.state.ground == TOUCHES_OUTSIDE
-        gone = touching & (population.state.load == 0)
+        gone = (population.state.ground == TOUCHES_OUTSIDE) & (population.state.load == 0)
         left += len(population.settle(NO_GROUND, TICK_S).masses_kg)
-        memory = without(memory, gone)
+        rows = np.cumsum(~gone) - 1
+        pairs = {(i, j): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
+        memory = {(int(rows[i]), int(rows[j])): springs for (i, j), springs in pairs.items()}
     assert left >= 8
     assert joined == 2
     assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) > 10
-
-
-def lying(population, **arrays):
-    """Add one parcel and set what a step would have found out about it."""
-    add(population, [[0.1, 0.2, RADIUS]])
-    for name, value in arrays.items():
-        getattr(population.state, name)[-1] = value
-    return population.state
-
-
-def ticks_until_landed(population):
-    for tick in range(1, 20):
-        if len(population.settle(NO_GROUND, TICK_S).masses_kg):
-            return tick
-    return None
 
 
 WHILE = math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
@@ -160,20 +140,21 @@ SLOW, FAST = [0.9 * SETTLING_SPEED_M_S, 0.0, 0.0], [1.1 * SETTLING_SPEED_M_S, 0.
 )
 def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_population, arrays, ticks):
     population = make_population()
-    lying(population, **arrays)
-    assert ticks_until_landed(population) == ticks
+    add(population, [[0.1, 0.2, RADIUS]])
+    for name, value in arrays.items():  # what a step would have found out about it
+        getattr(population.state, name)[-1] = value
+    landed = [len(population.settle(NO_GROUND, TICK_S).masses_kg) for _ in range(20)]
+    assert landed == [int(tick == ticks) for tick in range(1, 21)]
     assert len(population.state.masses) == (ticks is None)
 
 
 def test_the_rest_must_not_be_interrupted(make_population):
     population = make_population()
-    state = lying(population, ground=TOUCHES_GROUND)
-    for _ in range(3):
-        for _ in range(4):
-            assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
-        state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
-        population.settle(NO_GROUND, TICK_S)
-        state.velocities[0, 0] = 0.0
+    add(population, [[0.1, 0.2, RADIUS]])
+    population.state.ground[0] = TOUCHES_GROUND
+    for tick in range(15):
+        population.state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S if tick % WHILE == WHILE - 1 else 0.0
+        assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
 
 
 def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
@@ -217,16 +198,6 @@ def test_another_number_of_plates_clears_their_memory_and_nothing_else(make_popu
     assert population.state.plate_springs.shape == (2, plates + 2, 6)
     assert not population.state.plate_springs.any()
     np.testing.assert_array_equal(population.state.positions[:, 2], [1.0, 2.0])
-
-
-def test_nothing_is_left_after_clearing_and_a_new_start_repeats_the_first(make_population, no_tool, site):
-    population, runs = make_population(), []
-    for _ in range(2):
-        fallen(population, no_tool(STEPS), site(), 20, np.random.default_rng(0))
-        runs.append([array.tobytes() for array in population.state])
-        population.clear()
-        assert len(population.state.masses) == population.awake_count == 0
-    assert runs[0] == runs[1]
 
 
 @pytest.mark.parametrize("copied", [deepcopy, lambda population: pickle.loads(pickle.dumps(population))])
