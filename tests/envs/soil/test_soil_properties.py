@@ -1,5 +1,6 @@
 """What must hold for any motion of the bucket, for every soil and fidelity."""
 
+import dataclasses
 import itertools
 import math
 
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil, Tool
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil
 from lerobot_excav.envs.soil.relaxation import REST_TAN
 from validation.soil.reference.plates import nearest_point, plate_polygons
 
@@ -43,8 +44,8 @@ def swung(tool, yaw_rad, yaw_rate):
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     turn, spin = (np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, yaw_rate]))
     position = turn @ tool.position_w
-    return Tool(
-        geometry=tool.geometry,
+    return dataclasses.replace(
+        tool,
         position_w=position,
         rotation_w=turn @ tool.rotation_w,
         linear_velocity_w=turn @ tool.linear_velocity_w + np.cross(spin, position),

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET
 from lerobot_excav.envs.soil.parcels.birth import Intake, gather
+from validation.soil.reference.worlds import RADIUS
 
-RADIUS = 0.045
 PARCEL_M3 = 6.4e-4
 EDGE, LIP = BUCKET.profile_t[0], BUCKET.profile_t[-1]
 HALF = 0.5 * BUCKET.inner_width_m

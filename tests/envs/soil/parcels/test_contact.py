@@ -12,11 +12,8 @@ from lerobot_excav.envs.soil.parcels.contact import (
     wall_contact,
 )
 from validation.soil.reference import contact as reference
+from validation.soil.reference.worlds import DT, MASS, RADIUS, STIFFNESS
 
-RADIUS = 0.045
-MASS = 0.94
-DT = 0.001
-STIFFNESS = MASS * (0.2 / DT) ** 2
 UP = (0.0, 0.0, 1.0)
 LAW = Law(STIFFNESS, 0.5, 0.3, 0.0)
 

@@ -13,11 +13,21 @@ from lerobot_excav.envs.soil.parcels.pairs import room_for
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls
 from validation.soil.reference import motion as reference
 from validation.soil.reference.plates import bucket_polygons, nearest_point
+from validation.soil.reference.worlds import (
+    DT,
+    LAWS,
+    MASS,
+    RADIUS,
+    STIFFNESS,
+    assert_same,
+    make_state,
+    no_tool,
+    random_state,
+    run,
+    site,
+    tool_path,
+)
 
-RADIUS = 0.045
-MASS = 0.94
-DT = 0.001
-STIFFNESS = MASS * (0.2 / DT) ** 2
 BOX = BoxWalls(0.4, 0.1, 0.0, 0.5, 0.4, 0.5, math.cos(0.3), math.sin(0.3))
 WEIGHT = np.array([0.0, 0.0, -GRAVITY_M_S2])
 
@@ -30,12 +40,10 @@ def energy(state):
 
 @given(seed=st.integers(0, 2**16), cohesion=st.sampled_from([0.0, 2100.0]), has_tool=st.booleans())
 @settings(max_examples=25)
-def test_sub_steps_are_those_of_the_reference(
-    random_state, assert_same, tool_path, site, laws, run, seed, cohesion, has_tool
-):
+def test_sub_steps_are_those_of_the_reference(seed, cohesion, has_tool):
     """A crowd in a moving bucket above a box and rough ground: all contacts at once, one parcel too fast."""
     rng, steps = np.random.default_rng(seed), 8
-    laws = laws._replace(parcel=laws.parcel._replace(cohesion=cohesion))
+    laws = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=cohesion))
     tool = tool_path((0.8, 0.0, 0.3), -2.6, [0.01, 0.0, 0.01], 0.02, steps)._replace(present=int(has_tool))
     ground = site(heights=rng.uniform(0.0, 0.3, (30, 30)), box=BOX, box_heights=rng.uniform(0, 0.1, (8, 6)))
     state = random_state(rng, 16, [0.5, 0.3, 0.2], centre=(0.3, 0.0, 0.25))
@@ -52,7 +60,7 @@ def test_sub_steps_are_those_of_the_reference(
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
-def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mass(random_state, run, seed):
+def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mass(seed):
     """Angular momentum holds to first order: positions move between the forces of two sub-steps."""
     state = random_state(np.random.default_rng(seed), 10, 0.08, centre=(0.0, 0.0, 50.0))
     total = state.masses.sum()
@@ -72,25 +80,20 @@ def test_free_parcels_keep_their_momentum_and_their_spin_about_the_centre_of_mas
     np.testing.assert_allclose(about_centre(), turning, atol=1e-9 * scale + 1e-9)
 
 
-@pytest.fixture(scope="module")
-def roll(make_state, site, laws, run):
+def roll(angle, sliding, rolling, steps):
     """Lay a parcel at rest on a long slope and give it some time; return it and where it began."""
-
-    def on_slope(angle, sliding, rolling, steps):
-        x = np.linspace(-2.95, 2.95, 60)
-        ground = site(heights=np.repeat((3.0 - x * math.tan(angle))[:, None], 60, axis=1))
-        foot = np.array([-2.0, 0.0, 3.0 + 2.0 * math.tan(angle)])
-        normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
-        start = foot + (RADIUS - MASS * GRAVITY_M_S2 * math.cos(angle) / STIFFNESS) * normal
-        state = make_state([start])
-        run(state, steps, ground, laws=laws._replace(ground=Law(STIFFNESS, sliding, rolling, 0.0)))
-        return state, start
-
-    return on_slope
+    x = np.linspace(-2.95, 2.95, 60)
+    ground = site(heights=np.repeat((3.0 - x * math.tan(angle))[:, None], 60, axis=1))
+    foot = np.array([-2.0, 0.0, 3.0 + 2.0 * math.tan(angle)])
+    normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
+    start = foot + (RADIUS - MASS * GRAVITY_M_S2 * math.cos(angle) / STIFFNESS) * normal
+    state = make_state([start])
+    run(state, steps, ground, laws=LAWS._replace(ground=Law(STIFFNESS, sliding, rolling, 0.0)))
+    return state, start
 
 
 @pytest.mark.parametrize("friction_deg", [20.0, 35.0])
-def test_a_parcel_that_cannot_roll_sticks_below_the_friction_angle_and_slides_above_as_coulomb_says(roll, friction_deg):
+def test_a_parcel_that_cannot_roll_sticks_below_the_friction_angle_and_slides_above_as_coulomb_says(friction_deg):
     friction = math.tan(math.radians(friction_deg))
     state, start = roll(math.radians(friction_deg - 1.0), friction, 10.0, 1000)
     assert np.abs(state.positions - start).max() < 0.006  # the springs of sliding and rolling stretch
@@ -102,7 +105,7 @@ def test_a_parcel_that_cannot_roll_sticks_below_the_friction_angle_and_slides_ab
 
 
 @pytest.mark.parametrize("rolling", [0.2, 0.5])
-def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(roll, rolling):
+def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(rolling):
     below, _ = roll(math.atan(rolling) - 0.02, 2.0, rolling, 800)
     above, _ = roll(math.atan(rolling) + 0.05, 2.0, rolling, 800)
     assert np.linalg.norm(below.velocities[0]) < 1e-3
@@ -112,16 +115,16 @@ def test_a_parcel_rolls_above_the_angle_of_rolling_friction_and_not_below(roll, 
 
 
 @pytest.mark.parametrize("rolling", [0.1, 0.3])
-def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(make_state, laws, run, rolling):
+def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(rolling):
     """7/10 m v^2 is used up by the force mu_r m g along the way."""
     start, speed = [-2.0, 0.0, RADIUS - MASS * GRAVITY_M_S2 / STIFFNESS], 1.0
     state = make_state([start], velocities=[[speed, 0.0, 0.0]], spins=[[0.0, speed / RADIUS, 0.0]])
-    run(state, 2000, laws=laws._replace(ground=Law(STIFFNESS, 1.0, rolling, 0.0)))
+    run(state, 2000, laws=LAWS._replace(ground=Law(STIFFNESS, 1.0, rolling, 0.0)))
     assert np.linalg.norm(state.velocities[0]) < 1e-3
     assert state.positions[0, 0] + 2.0 == pytest.approx(0.7 * speed**2 / (rolling * GRAVITY_M_S2), rel=0.1)
 
 
-def test_a_stack_stays_at_rest_and_its_energy_does_not_grow(make_state, run):
+def test_a_stack_stays_at_rest_and_its_energy_does_not_grow():
     """A square pyramid of spheres that just touch."""
     layers = [(2 * i + level, 2 * j + level, level) for level in range(3) for i, j in np.ndindex(3 - level, 3 - level)]
     state = make_state(RADIUS * (np.array(layers) * [1.0, 1.0, math.sqrt(2.0)] + [0.0, 0.0, 1.0]))
@@ -135,7 +138,7 @@ def test_a_stack_stays_at_rest_and_its_energy_does_not_grow(make_state, run):
     assert max(energies) <= energies[0] + 1e-4
 
 
-def test_what_contacts_remember_outlives_new_lists_of_neighbours(make_state, no_tool, site, laws, rng):
+def test_what_contacts_remember_outlives_new_lists_of_neighbours(rng):
     """Two sticky lumps fly past each other: the list is made anew again and again, their contacts stay closed.
 
     The twin has no list: it looks at all pairs and forgets only what opens.
@@ -145,7 +148,7 @@ def test_what_contacts_remember_outlives_new_lists_of_neighbours(make_state, no_
     state.velocities[:8] = [4.0, 0.0, 0.0]
     state.velocities[:] += rng.normal(0.0, 0.05, (16, 3))
     state.spins[:] = rng.normal(0.0, 2.0, (16, 3))
-    sticky = laws._replace(parcel=laws.parcel._replace(cohesion=2e4))
+    sticky = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=2e4))
     twin, memory = deepcopy(state), {}
     anchor, made = state.positions.copy(), 0
     pairs, spare, rows = room_for(16), room_for(16), np.full(16, -1, dtype=np.int64)
@@ -162,12 +165,12 @@ def test_what_contacts_remember_outlives_new_lists_of_neighbours(make_state, no_
 
 
 @pytest.mark.parametrize("cohesion", [1000.0, 1400.0, 1500.0, 2100.0])
-def test_cohesion_holds_a_hanging_parcel_up_to_its_limit(make_state, laws, run, cohesion):
+def test_cohesion_holds_a_hanging_parcel_up_to_its_limit(cohesion):
     limit = cohesion * math.pi * RADIUS**2
     overlap = max(0.0, limit - MASS * GRAVITY_M_S2) / STIFFNESS
     state = make_state([[0.0, 0.0, 2.0], [0.0, 0.0, 2.0 - 2 * RADIUS + overlap + 1e-6]])
     state.asleep[0] = 1  # it is held
-    run(state, 500, laws=laws._replace(parcel=laws.parcel._replace(cohesion=cohesion)))
+    run(state, 500, laws=LAWS._replace(parcel=LAWS.parcel._replace(cohesion=cohesion)))
     hangs = abs(state.positions[1, 2] - (2.0 - 2 * RADIUS + overlap)) < 1e-4
     assert hangs == (limit > MASS * GRAVITY_M_S2)
 
@@ -185,7 +188,7 @@ def crosses(polygon, start, end):
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=12)
-def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, run, seed):
+def test_no_parcel_passes_a_plate_at_the_largest_speed(seed):
     """Thrown at the bucket from all sides, while that moves as fast as sub-steps allow."""
     rng, steps, count = np.random.default_rng(seed), 25, 40
     way = rng.normal(0.0, 1.0, 3)
@@ -211,7 +214,7 @@ def test_no_parcel_passes_a_plate_at_the_largest_speed(make_state, tool_path, ru
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.01, 0.5, 1.0, 1.8])
-def test_parcels_born_into_each_other_part_without_a_bang(make_state, rng, run, distance):
+def test_parcels_born_into_each_other_part_without_a_bang(rng, distance):
     """Two part at the separation speed; only the push of the first sub-step cannot know yet what speed it makes.
 
     In a crowd at one place (distance 0), the pushes of all 20 add up in that sub-step, to near the speed limit.
@@ -231,7 +234,7 @@ def test_parcels_born_into_each_other_part_without_a_bang(make_state, rng, run, 
 
 
 @pytest.mark.parametrize("share", [1.0, 0.3, 0.1, 0.03, 1e-2, 1e-4, 1e-8])
-def test_a_light_remainder_lands_as_softly_as_a_whole_parcel(make_state, run, share):
+def test_a_light_remainder_lands_as_softly_as_a_whole_parcel(share):
     """A stiffness made for whole parcels would shoot it to the sky."""
     state = make_state([[0.0, 0.0, 0.5]], radii=RADIUS * share ** (1.0 / 3.0), masses=MASS * share)
     energies = [energy(state)]

@@ -8,9 +8,8 @@ from bench.soil import BUCKET
 from lerobot_excav.envs.soil.parcels import plates
 from lerobot_excav.envs.soil.parcels.plates import CLOSEST, BoxWalls, nearest_on_plate
 from validation.soil.reference import plates as reference
+from validation.soil.reference.worlds import DT, LAWS, RADIUS, make_state, press_both, random_state, tool_path
 
-RADIUS = 0.045
-DT = 0.001
 MARGIN = 0.05
 HALF = 0.5 * BUCKET.inner_width_m
 SHELL = len(BUCKET.profile_t) - 1
@@ -21,7 +20,7 @@ points = st.tuples(st.floats(-0.3, 1.5), st.floats(-0.7, 0.7), st.floats(-0.4, 0
 
 @given(point=points, plate=st.integers(0, SHELL + 1))
 @settings(max_examples=150)
-def test_the_nearest_point_of_a_plate_is_that_of_the_reference(tool_path, point, plate):
+def test_the_nearest_point_of_a_plate_is_that_of_the_reference(point, plate):
     """All corners of a convex plate lie beyond the plane through its nearest point, seen from the point."""
     tool = tool_path()
     found = np.array(nearest_on_plate(tool.profile, tool.planes, tool.half_width, plate, point))
@@ -32,7 +31,7 @@ def test_the_nearest_point_of_a_plate_is_that_of_the_reference(tool_path, point,
 
 @given(seed=st.integers(0, 2**16), at_box=st.booleans())
 @settings(max_examples=50)
-def test_bucket_and_box_press_parcels_as_their_polygons_do(random_state, press_both, tool_path, laws, seed, at_box):
+def test_bucket_and_box_press_parcels_as_their_polygons_do(seed, at_box):
     rng = np.random.default_rng(seed)
     tool = tool_path(rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.2, 0.5), rng.uniform(-0.05, 0.05, 3), 0.05, steps=4)
     near = (4.0, 1.0, 0.7) if at_box else tool.positions[0] + np.array([0.7, 0.0, 0.3]) @ tool.rotations[0].T
@@ -41,15 +40,15 @@ def test_bucket_and_box_press_parcels_as_their_polygons_do(random_state, press_b
 
     def act(module):
         if at_box:
-            return lambda parcels, _: module.press_box(parcels, SHELL + 2, BOX, laws.steel, DT)
-        return lambda parcels, step: module.press_bucket(parcels, step, tool, MARGIN, laws.steel, DT)
+            return lambda parcels, _: module.press_box(parcels, SHELL + 2, BOX, LAWS.steel, DT)
+        return lambda parcels, step: module.press_bucket(parcels, step, tool, MARGIN, LAWS.steel, DT)
 
     press_both(state, act(plates), act(reference), "plate_springs", "shell", times=4)
 
 
 @given(point=points)
 @settings(max_examples=60)
-def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(make_state, tool_path, laws, point):
+def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(point):
     tool = tool_path()
     polygons = reference.bucket_polygons(tool)
     state = make_state([tool.rotations[0] @ point])
@@ -57,7 +56,7 @@ def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(make_stat
     gaps = np.array([np.linalg.norm(away) for away in before])
     if (gaps < RADIUS).sum() != 1 or gaps.min() < 1e-6:
         return  # in a corner, plates push one after the other; exactly on a plate, there is no side
-    plates.press_bucket(state, 0, tool, MARGIN, laws.steel, DT)
+    plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT)
     point_t = state.positions[0] @ tool.rotations[0]
     for plate, away in zip(polygons, before, strict=True):
         after = point_t - reference.nearest_point(plate, point_t)
@@ -65,7 +64,7 @@ def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(make_stat
         assert np.linalg.norm(after) >= min(CLOSEST * RADIUS, float(np.linalg.norm(away))) - 1e-9
 
 
-def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_or_the_box(make_state, tool_path, laws):
+def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_or_the_box():
     """Also of the corner that is farthest from the bucket's origin, and of the outside of a wall."""
     tool = tool_path(pitch=0.0)
     corner = np.array([1.15, HALF, 0.0])
@@ -74,8 +73,8 @@ def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_o
     outwards = np.array([corner / np.linalg.norm(corner), (BOX.cos, BOX.sin, 0.0)])
     for gap in (0.99, 1.2):  # in one sub-step, a parcel moves by less than a radius
         state.positions[:] = [corner, wall] + gap * RADIUS * outwards
-        plates.press_bucket(state, 0, tool, MARGIN, laws.steel, DT)
-        plates.press_box(state, SHELL + 2, BOX, laws.steel, DT)
+        plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT)
+        plates.press_box(state, SHELL + 2, BOX, LAWS.steel, DT)
         if gap < 1.0:
             assert state.plate_springs[0].any()
             assert state.plate_springs[1].any()

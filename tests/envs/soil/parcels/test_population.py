@@ -22,9 +22,8 @@ from lerobot_excav.envs.soil.parcels.store import (
     TOUCHES_OUTSIDE,
 )
 from validation.soil.reference import motion as reference
+from validation.soil.reference.worlds import LAWS, MASS, RADIUS, make_population, no_tool, site, tool_path
 
-RADIUS = 0.045
-MASS = 0.94
 STEPS = 20
 
 NO_GROUND = Site(np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0)
@@ -38,7 +37,7 @@ def add(population, positions, velocities=None, masses=None):
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
-def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(laws, make_population, seed):
+def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(seed):
     rng = np.random.default_rng(seed)
     positions, velocities = rng.uniform(-1.0, 1.0, (30, 3)), rng.normal(0.0, 1.0, (30, 3))
     masses = rng.uniform(0.1, 2.0, 30)
@@ -53,7 +52,7 @@ def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_m
     np.testing.assert_allclose(state.radii, RADIUS * np.cbrt(state.masses / MASS))
 
 
-def test_a_parcel_too_many_joins_the_nearest_one_that_is_awake(make_population):
+def test_a_parcel_too_many_joins_the_nearest_one_that_is_awake():
     population = make_population(most_awake=3)
     add(population, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     population.state.asleep[2] = 1
@@ -78,7 +77,7 @@ def bits(population, landed):
     return [array.tobytes() for array in (*population.state, *parts)]
 
 
-def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch, make_population, no_tool, site):
+def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch):
     runs = []
     for capacity in (3, 17, 1024):
         monkeypatch.setattr(module, "_FIRST_CAPACITY", capacity)
@@ -93,9 +92,9 @@ def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch, 
     assert all(run == runs[0] for run in runs)
 
 
-def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_population, no_tool, site, laws):
+def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
     """Sticky lumps beyond the border: what touches the ground there leaves at once, new parcels join above."""
-    sticky = laws._replace(parcel=laws.parcel._replace(cohesion=1e4))
+    sticky = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=1e4))
     population, memory = make_population(laws=sticky), {}
     lump = 1.97 * RADIUS * np.array(list(np.ndindex(2, 2, 2)))
     place, rng = np.array([4.0, 0.0, 0.12]), np.random.default_rng(1)
@@ -138,7 +137,7 @@ SLOW, FAST = [0.9 * SETTLING_SPEED_M_S, 0.0, 0.0], [1.1 * SETTLING_SPEED_M_S, 0.
         ({"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL, "velocities": FAST}, 1),  # under the bucket
     ],
 )
-def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_population, arrays, ticks):
+def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(arrays, ticks):
     population = make_population()
     add(population, [[0.1, 0.2, RADIUS]])
     for name, value in arrays.items():  # what a step would have found out about it
@@ -148,7 +147,7 @@ def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_
     assert len(population.state.masses) == (ticks is None)
 
 
-def test_the_rest_must_not_be_interrupted(make_population):
+def test_the_rest_must_not_be_interrupted():
     population = make_population()
     add(population, [[0.1, 0.2, RADIUS]])
     population.state.ground[0] = TOUCHES_GROUND
@@ -157,7 +156,7 @@ def test_the_rest_must_not_be_interrupted(make_population):
         assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
 
 
-def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
+def test_what_landed_says_where_and_how_much_and_the_others_stay():
     population = make_population()
     add(population, np.arange(15.0).reshape(5, 3), masses=MASS * np.arange(1.0, 6.0))
     population.state.ground[:] = [TOUCHES_OUTSIDE, TOUCHES_NOTHING, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_NOTHING]
@@ -170,7 +169,7 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
     np.testing.assert_allclose(population.state.masses, MASS * np.array([2.0, 5.0]))
 
 
-def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(make_population, tool_path, site):
+def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up():
     """The back of a carried bucket is let down on a parcel that lies on the ground."""
     population = make_population()
     depth = float(BUCKET.profile_t[:, 1].max())
@@ -187,7 +186,7 @@ def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothin
     assert population.state.masses.sum() == 0.0
 
 
-def test_another_number_of_plates_clears_their_memory_and_nothing_else(make_population):
+def test_another_number_of_plates_clears_their_memory_and_nothing_else():
     population = make_population()
     add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
     population.state.plate_springs[:] = 1.0
@@ -201,7 +200,7 @@ def test_another_number_of_plates_clears_their_memory_and_nothing_else(make_popu
 
 
 @pytest.mark.parametrize("copied", [deepcopy, lambda population: pickle.loads(pickle.dumps(population))])
-def test_a_copy_goes_on_like_its_original(copied, make_population, no_tool, site):
+def test_a_copy_goes_on_like_its_original(copied):
     original = make_population()
     fallen(original, no_tool(STEPS), site(), 12, np.random.default_rng(0))
     other = copied(original)
