@@ -40,6 +40,7 @@ def soil_strength(parameters: SoilParameters) -> SoilStrength:
         bearing_depth=depth,
         bearing_width=width,
         penetration_scale=p.penetration_scale,
+        table=failure_table(p.friction_angle_rad, p.steel_friction_angle_rad),
     )
 
 
@@ -61,10 +62,7 @@ def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, w
     spacing = depth_m / 100.0
     level: Array = np.full((2, 2), depth_m)
     grid = Grid.centred((2, 2), 2.0 * spacing, 2.0 * spacing)
-    table = failure_table(p.friction_angle_rad, p.steel_friction_angle_rad)
-    wedges, _ = edge_limits(
-        level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p), table
-    )
+    wedges, _ = edge_limits(level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p))
     angle = rake_rad + p.steel_friction_angle_rad
     return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
 
@@ -84,7 +82,6 @@ class SoilResistance:
     def __init__(self, parameters: SoilParameters, slices: int) -> None:
         self._slices = slices
         self._soil = soil_strength(parameters)
-        self._table = failure_table(parameters.friction_angle_rad, parameters.steel_friction_angle_rad)
         self.forget()
 
     def forget(self) -> None:
@@ -138,7 +135,7 @@ class SoilResistance:
         if self._pressure is None or self._geometry is None or not self._geometry.has_shape_of(geometry):
             self._geometry = geometry
             faces = OuterFaces.of(geometry, max(2, self._slices // 2))
-            self._pressure = PlatePressure(faces, self._soil, self._table)
+            self._pressure = PlatePressure(faces, self._soil)
         return self._pressure
 
     def _edge(
@@ -163,7 +160,6 @@ class SoilResistance:
             ahead,
             geometry.inner_width_m,
             self._soil,
-            self._table,
         )
         steel, shape = self._soil.steel_friction, edges.shape
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.

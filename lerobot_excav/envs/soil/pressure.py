@@ -65,14 +65,7 @@ def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
 
 @kernel
 def plate_limits(
-    overlaps: Array,
-    sinkages: Array,
-    factors: Array,
-    normals: Array,
-    areas: Array,
-    breadths: Array,
-    soil: SoilStrength,
-    table: Array,
+    overlaps: Array, sinkages: Array, factors: Array, normals: Array, areas: Array, breadths: Array, soil: SoilStrength
 ) -> Array:
     """Return the greatest push [N] of the soil on each sample of the outer faces.
 
@@ -84,7 +77,6 @@ def plate_limits(
         areas: (m,) [m2].
         breadths: (m,) shares of the breadth of the footing [m].
         soil: What the soil can bear.
-        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
     limits = np.zeros(len(overlaps))
     contacts = np.minimum(1.0, overlaps / PLATE_THICKNESS_M)
@@ -92,7 +84,7 @@ def plate_limits(
     for k in range(len(overlaps)):
         if overlaps[k] > 0.0:
             upright = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
-            _, cohesion, surcharge = table_row(table, math.atan2(upright, normals[k, 2]))
+            _, cohesion, surcharge = table_row(soil.table, math.atan2(upright, normals[k, 2]))
             passive = (soil.unit_weight * overlaps[k] * surcharge + soil.cohesion * cohesion) * math.cos(
                 soil.steel_friction
             )
@@ -112,13 +104,11 @@ class PlatePressure:
     Args:
         faces: Samples of its outer faces.
         soil: What the soil can bear.
-        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
 
-    def __init__(self, faces: OuterFaces, soil: SoilStrength, table: Array) -> None:
+    def __init__(self, faces: OuterFaces, soil: SoilStrength) -> None:
         self._faces = faces
         self._soil = soil
-        self._table = table
         self._sinkages: Array = np.zeros(len(faces.areas_m2))
 
     def patches(self, heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, dt_s: float) -> Patches:
@@ -140,6 +130,5 @@ class PlatePressure:
             faces.areas_m2,
             faces.breadths_m,
             self._soil,
-            self._table,
         )
         return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

@@ -7,19 +7,16 @@ import pytest
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.soil.bucket import Bucket, heaped_volume_m3
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.tool import ToolGeometry
 from lerobot_excav.errors import ConfigurationError
+from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
-CELL = 0.05
 
 
-def fresh(height=0.8):
-    field = HeightField((60, 60), (CELL, CELL), 0.0)
-    field.reset(np.full((60, 60), height))
-    return Bucket(SAND, FIDELITIES["standard"]), field
+def fresh():
+    return Bucket(SAND, FIDELITIES["standard"]), flat(0.8, 60)
 
 
 def dragged(tick):

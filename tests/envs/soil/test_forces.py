@@ -10,10 +10,10 @@ from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import SoilResistance, bearing_factors, blade_force_n
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.wedge import PENETRATION_CAP_N
+from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
 FULL_SPEED = np.array([-1.0, 0.0, 0.0])
@@ -22,12 +22,6 @@ PLATE_RAD = math.atan2(0.39, -0.39)
 
 INTO = np.array([-1.0, 0.0, -1.0]) / math.sqrt(2)
 """Straight along a plate with a rake of 45 degrees."""
-
-
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
 
 
 def answer(resistance, field, tool, floor_depth_m=0.0):

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
-from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle, failure_table
+from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import bearing_factors, soil_strength
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.pressure import (
@@ -20,23 +19,17 @@ from lerobot_excav.envs.soil.pressure import (
     plate_limits,
     plate_overlaps,
 )
+from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
 SOIL = soil_strength(SAND)
-TABLE = failure_table(SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
 WEIGHT = SAND.density_kg_m3 * GRAVITY_M_S2
 DOWN, LEVEL = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0]])
 
 
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
-
-
 def limit(overlap, sinkage, normal, area=0.1, breadth=0.3, factor=1.0, soil=SOIL):
     before, after = (np.array([[value] for value in part]) for part in ((overlap, sinkage, factor), (area, breadth)))
-    return float(plate_limits(*before, normal, *after, soil, TABLE)[0])
+    return float(plate_limits(*before, normal, *after, soil)[0])
 
 
 FACES = OuterFaces.of(BUCKET, 4)
@@ -51,7 +44,7 @@ def heel_down(height, velocity=(0.0, 0.0, -0.5)):
 
 def press_in(field, depths):
     """Press the bucket down on flat ground to some depths, in turn."""
-    plates = PlatePressure(FACES, SOIL, TABLE)
+    plates = PlatePressure(FACES, SOIL)
     for depth, way in zip(depths, np.diff(depths, prepend=-0.01), strict=True):
         tool = heel_down(1.0 - depth, (0.0, 0.0, -way / TICK_S))
         yield plates.patches(field.heights, field.grid, tool, 0.0, TICK_S)
@@ -101,7 +94,7 @@ def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving():
 def test_cohesion_adds_to_an_upright_plate_what_the_equation_says():
     sticky = SOIL._replace(cohesion=2000.0)
     more = limit(0.2, 0.0, LEVEL, breadth=0.0, soil=sticky) - limit(0.2, 0.0, LEVEL, breadth=0.0)
-    assert more == pytest.approx(0.1 * 2000.0 * TABLE[-1, 2] * math.cos(SAND.steel_friction_angle_rad))
+    assert more == pytest.approx(0.1 * 2000.0 * SOIL.table[-1, 2] * math.cos(SAND.steel_friction_angle_rad))
 
 
 @pytest.mark.parametrize("normal", [DOWN, LEVEL, np.array([[0.6, 0.0, -0.8]]), np.array([[0.0, 0.6, 0.8]])])
@@ -147,7 +140,7 @@ def test_soil_on_one_side_pushes_to_the_other():
     field = flat(0.0)
     field.heights[:, 68:] = 1.0  # beyond the left side plate only
     tool = heel_down(0.3, (0.0, 1.0, 0.0))
-    patches = PlatePressure(FACES, SOIL, TABLE).patches(field.heights, field.grid, tool, 0.0, TICK_S)
+    patches = PlatePressure(FACES, SOIL).patches(field.heights, field.grid, tool, 0.0, TICK_S)
     assert len(patches) > 0
     np.testing.assert_allclose(patches.normals_w, np.tile([0.0, -1.0, 0.0], (len(patches), 1)), atol=1e-9)
     assert patches.wrench(tool.position_w, tool.linear_velocity_w, np.zeros(3))[0][1] < -500.0

@@ -19,16 +19,6 @@ small_fields = arrays(np.float64, (6, 7), elements=st.floats(0.0, 2.0))
 ceilings = arrays(np.float64, (6, 7), elements=st.sampled_from([math.inf, math.inf, 1.0, 0.2, -1.0]))
 
 
-def steepest(heights, cell):
-    slopes = [
-        np.abs(np.diff(heights, axis=0)).max() / cell,
-        np.abs(np.diff(heights, axis=1)).max() / cell,
-        np.abs(heights[1:, 1:] - heights[:-1, :-1]).max() / (cell * math.sqrt(2)),
-        np.abs(heights[1:, :-1] - heights[:-1, 1:]).max() / (cell * math.sqrt(2)),
-    ]
-    return float(max(slopes))
-
-
 @given(heights=small_fields, ceiling=ceilings, border=st.sampled_from([0.0, 0.3, math.inf]), wide=st.floats(0.03, 0.08))
 @settings(max_examples=60)
 def test_a_sweep_is_the_reference_sweep(heights, ceiling, border, wide):
@@ -58,7 +48,7 @@ def test_heights_stay_above_the_floor_and_volume_is_kept(heights):
     rested = relax(heights, CELL, SLOPE)
     assert (rested >= 0).all()
     assert rested.sum() == pytest.approx(heights.sum(), rel=1e-12)
-    assert steepest(rested, CELL) <= SLOPE + REST_TAN + 1e-9
+    assert avalanche.steepest(rested, CELL) <= SLOPE + REST_TAN + 1e-9
 
 
 def test_a_gentle_slope_is_left_alone_byte_for_byte():

@@ -13,6 +13,7 @@ from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil
 from lerobot_excav.envs.soil.relaxation import REST_TAN
+from validation.soil.reference.avalanche import steepest
 from validation.soil.reference.plates import nearest_point, plate_polygons
 
 TICKS = 120
@@ -92,14 +93,6 @@ def distance_to_plates(points_t):
     return np.minimum(to_shell, to_cheeks)
 
 
-def steepest(heights):
-    slopes = [np.abs(np.diff(heights, axis=axis)).max() / CELL_M for axis in (0, 1)]
-    diagonal = CELL_M * math.sqrt(2.0)
-    slopes.append(np.abs(heights[1:, 1:] - heights[:-1, :-1]).max() / diagonal)
-    slopes.append(np.abs(heights[1:, :-1] - heights[:-1, 1:]).max() / diagonal)
-    return max(slopes)
-
-
 def assert_sound(soil, total):
     """The books balance, nothing is negative, everything is a number."""
     ledger = soil.ledger_kg()
@@ -162,7 +155,7 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
     assert speed < 0.01
     assert soil.heights_m.tobytes() == before
     assert_sound(soil, total)
-    assert steepest(soil.heights_m) <= soil.parameters.slope_tan + REST_TAN + 1e-9
+    assert steepest(soil.heights_m, CELL_M) <= soil.parameters.slope_tan + REST_TAN + 1e-9
 
 
 @given(points=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20))

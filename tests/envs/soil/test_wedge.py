@@ -5,28 +5,20 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.forces import soil_strength
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.wedge import EDGE_THICKNESS_M, edge_bearing, edge_limits, table_row, wedge_area
 from validation.soil.reference import wedge as reference
+from validation.soil.reference.worlds import flat
 
 SAND = soil_strength(PRESETS["sand"])
-TABLE = failure_table(PRESETS["sand"].friction_angle_rad, PRESETS["sand"].steel_friction_angle_rad)
 AHEAD = (-1.0, 0.0)
-
-
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
 
 
 def limits(field, edges, weighed=None, rake_deg=40.0):
     weighed = field.heights if weighed is None else weighed
     rake = math.radians(rake_deg)
-    return edge_limits(field.heights, weighed, field.grid, np.array(edges), rake, AHEAD, 0.7, SAND, TABLE)
+    return edge_limits(field.heights, weighed, field.grid, np.array(edges), rake, AHEAD, 0.7, SAND)
 
 
 EDGE = [[0.0, 0.0, 0.7]]
@@ -46,7 +38,9 @@ def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
 
 def test_rakes_beyond_the_table_count_as_its_ends():
     for inside, outside in ((20.0, -30.0), (90.0, 100.0), (90.0, 170.0)):
-        assert table_row(TABLE, math.radians(outside)) == pytest.approx(table_row(TABLE, math.radians(inside)))
+        assert table_row(SAND.table, math.radians(outside)) == pytest.approx(
+            table_row(SAND.table, math.radians(inside))
+        )
     for inside, outside in ((90.0, 120.0), (20.0, 5.0)):
         found = limits(flat(), EDGE, rake_deg=outside)[0]
         assert found == pytest.approx(limits(flat(), EDGE, rake_deg=inside)[0])

@@ -1,4 +1,4 @@
-"""Small worlds of parcels, in which tests let kernels and their twins meet."""
+"""Small worlds, in which tests let kernels and their twins meet."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from bench.soil import BUCKET, rotation_at
 from lerobot_excav.envs.soil.arrays import Array
-from lerobot_excav.envs.soil.height_field import Grid
+from lerobot_excav.envs.soil.height_field import Grid, HeightField
 from lerobot_excav.envs.soil.motion import Pose, path
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance
@@ -27,6 +27,13 @@ DT = 0.001
 STIFFNESS = MASS * (0.2 / DT) ** 2
 PLATES = len(BUCKET.profile_t) + 1 + WALLS
 LAWS = Laws(Law(STIFFNESS, 0.5, 0.3, 0.0), Law(STIFFNESS, 0.97, 0.6, 0.0), Law(STIFFNESS, 0.49, 0.3, 0.0))
+
+
+def flat(height: float = 1.0, cells: int = 120) -> HeightField:
+    """Return a level field of 5-cm cells."""
+    field = HeightField((cells, cells), (0.05, 0.05), 0.0)
+    field.reset(np.full((cells, cells), height))
+    return field
 
 
 def make_state(positions: ArrayLike, **arrays: ArrayLike) -> State:
