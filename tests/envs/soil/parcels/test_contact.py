@@ -3,14 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.parcels.contact import (
-    LARGEST_OVERLAP,
-    SEPARATION_M_S,
-    TANGENTIAL_STIFFNESS,
-    Law,
-    contact,
-    wall_contact,
-)
+from lerobot_excav.envs.soil.parcels.contact import LARGEST_OVERLAP, SEPARATION_M_S, Law, contact, wall_contact
 from validation.soil.reference import contact as reference
 from validation.soil.reference.worlds import DT, MASS, RADIUS, STIFFNESS
 
@@ -47,20 +40,6 @@ def test_a_contact_is_that_of_the_reference(memory, normal, gap, velocity, turni
     np.testing.assert_allclose(found, twins, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(kept[1], expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_array_equal(kept[0], memory)  # the other contact is left alone
-
-
-def test_a_sticking_contact_pulls_back_to_where_it_began_and_a_sliding_one_does_not():
-    overlap = 0.003
-    limit = LAW.sliding * STIFFNESS * overlap
-    stretch = limit / (TANGENTIAL_STIFFNESS * STIFFNESS)
-    still = (0.0, 0.0, 0.0)
-    for share in (0.5, 3.0):
-        memory = np.zeros((1, 6))
-        slowly = (share * stretch / (1000 * DT), 0.0, 0.0)
-        for _ in range(1000):
-            contact(memory, 0, UP, overlap, slowly, still, MASS, RADIUS, LAW, DT)
-        force, _ = contact(memory, 0, UP, overlap, still, still, MASS, RADIUS, LAW, DT)
-        assert force[0] == pytest.approx(-min(share, 1.0) * limit)
 
 
 def separation(closing, overlap, mass):

@@ -85,28 +85,25 @@ def test_forces_between_parcels_keep_linear_and_angular_momentum(seed):
     np.testing.assert_allclose(moments.sum(axis=0), 0.0, atol=1e-9)
 
 
-def remembered(state, rng):
-    """Return a list whose contacts are all closed, each with a memory of its own, and those memories."""
-    pairs = first_list(state)
-    names = listed(pairs, len(state.masses))
-    pairs.closed[: len(names)] = 1
-    pairs.springs[: len(names)] = rng.normal(0.0, 1.0, (len(names), 6))
-    return pairs, {name: pairs.springs[k].copy() for k, name in enumerate(names)}
-
-
-@given(seed=st.integers(0, 2**16))
-@settings(max_examples=40)
-def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(seed):
+@given(seed=st.integers(0, 2**16), capacity=st.sampled_from([23, 200]))
+@settings(max_examples=60)
+def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(seed, capacity):
+    """Also one with more room."""
     rng = np.random.default_rng(seed)
     state = random_state(rng, 20, 0.15)
-    pairs, memory = remembered(state, rng)
+    pairs = first_list(state)
+    names = listed(pairs, 20)
+    pairs.closed[: len(names)] = 1
+    pairs.springs[: len(names)] = rng.normal(0.0, 1.0, (len(names), 6))
+    memory = {name: pairs.springs[k].copy() for k, name in enumerate(names)}
     stayed = np.flatnonzero(rng.random(20) < 0.7)
     old_rows = np.concatenate([stayed, [-1, -1, -1]]).astype(np.int64)
     changed = make_state(np.concatenate([state.positions[stayed], rng.uniform(-0.15, 0.15, (3, 3))]))
     changed.radii[: len(stayed)] = state.radii[stayed]
     changed.radii[len(stayed) :] = state.radii.max()
     count = len(old_rows)
-    new = find_pairs(changed.positions, changed.radii, changed.asleep, pairs, old_rows, room_for(count))
+    room = enlarged(pairs, capacity), old_rows, room_for(capacity)
+    new = find_pairs(changed.positions, changed.radii, changed.asleep, *room)
     for k, (i, j) in enumerate(listed(new, count)):
         old = memory.get((int(old_rows[i]), int(old_rows[j])))
         if i < len(stayed) and j < len(stayed) and old is not None:
@@ -115,19 +112,6 @@ def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(seed):
         else:
             assert new.closed[k] == 0
             assert not new.springs[k].any()
-
-
-def test_memory_survives_when_more_parcels_come_than_there_was_room_for(rng):
-    """Also of the last rows, after earlier ones have left."""
-    state = random_state(rng, 30, 0.1)
-    pairs, memory = remembered(state, rng)
-    stayed = np.arange(10, 30)
-    larger = enlarged(pairs, 200)
-    new = find_pairs(state.positions[stayed], state.radii[stayed], state.asleep[stayed], larger, stayed, room_for(200))
-    names = listed(new, 20)
-    assert len(names) > 20
-    for k, (i, j) in enumerate(names):
-        np.testing.assert_array_equal(new.springs[k], memory[int(stayed[i]), int(stayed[j])])
 
 
 @given(seed=st.integers(0, 2**16), step=st.floats(0.0, 0.5), wind=st.floats(-10.0, 10.0))
