@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.cutting import cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField, Window
@@ -15,8 +15,6 @@ from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.birth import Intake
 from lerobot_excav.envs.soil.tool import Tool, ToolGeometry
 from lerobot_excav.errors import require
-
-Array = NDArray[np.float64]
 
 LARGEST_MOTION_M = 1.0
 """Motion per step above which the tool must have been placed by hand: 50 m/s at a tick of 0.02 s."""
@@ -101,7 +99,7 @@ class Bucket:
         geometry = tool.geometry
         motion_m = _checked_motion(geometry, self.pose, pose)
         before, self.pose = self.pose, pose
-        if self.intake is None or not self.intake.belongs_to(geometry):
+        if self.intake is None or not self.intake.geometry.has_shape_of(geometry):
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
             self.intake.bins.volumes[0, 0] = waiting_m3
@@ -139,12 +137,7 @@ class Bucket:
         return points, masses
 
     def _sweep(
-        self,
-        geometry: ToolGeometry,
-        path: Iterator[tuple[Pose, Pose]],
-        field: HeightField,
-        intake: Intake,
-        room: float,
+        self, geometry: ToolGeometry, path: Iterator[tuple[Pose, Pose]], field: HeightField, intake: Intake, room: float
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
         for start, end in path:
@@ -168,13 +161,7 @@ class Bucket:
         """Let the underside of the bucket hold avalanches back."""
         window = field.window(pose.place(geometry.corners_t))
         set_ceiling(
-            field.heights,
-            field.active,
-            field.ceiling,
-            field.grid,
-            geometry.planes_t,
-            *pose,
-            window.union(self._window),
+            field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, *pose, window.union(self._window)
         )
         field.wake()
         self._window = window

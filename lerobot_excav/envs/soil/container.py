@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.errors import require
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,8 +38,7 @@ class Container:
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         require(
-            bool((self.half_extent_m > 0).all()),
-            f"container half_extent_m={self.half_extent_m}; allowed: above 0.",
+            bool((self.half_extent_m > 0).all()), f"container half_extent_m={self.half_extent_m}; allowed: above 0."
         )
         require(
             0 < self.wall_height_m < math.inf,

@@ -7,17 +7,12 @@ motion of a sample relative to the tool tells through which face it came: openin
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lerobot_excav.envs.soil.arrays import Array, Flags
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Bins, gather
 from lerobot_excav.envs.soil.relaxation import mark_around
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
 
 OPENING = 0
 """Index of the opening among the planes of a tool."""
@@ -86,7 +81,7 @@ def is_covered(surface: float, grid: Grid, planes: Array, position: Array, rotat
 @kernel
 def push_aside(
     heights: Array,
-    active: Mask,
+    active: Flags,
     grid: Grid,
     planes: Array,
     position: Array,
@@ -128,11 +123,7 @@ def _level_unit(rotation: Array, vector: tuple[float, float, float]) -> tuple[fl
 
 @kernel
 def push_direction(
-    planes: Array,
-    rotation: Array,
-    face: int,
-    before: tuple[float, float, float],
-    now: tuple[float, float, float],
+    planes: Array, rotation: Array, face: int, before: tuple[float, float, float], now: tuple[float, float, float]
 ) -> tuple[float, float]:
     """Return the level unit direction in which soil is pushed aside.
 
@@ -153,7 +144,7 @@ def push_direction(
 @kernel
 def cut_column(
     heights: Array,
-    active: Mask,
+    active: Flags,
     grid: Grid,
     planes: Array,
     pose_before: Pose,
@@ -189,15 +180,7 @@ def cut_column(
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
             lost += push_aside(
-                heights,
-                active,
-                grid,
-                planes,
-                pose_now.position,
-                pose_now.rotation,
-                (x, y),
-                direction,
-                share - taken,
+                heights, active, grid, planes, pose_now.position, pose_now.rotation, (x, y), direction, share - taken
             )
     return entered, lost
 
@@ -205,7 +188,7 @@ def cut_column(
 @kernel
 def cut(
     heights: Array,
-    active: Mask,
+    active: Flags,
     grid: Grid,
     planes: Array,
     pose_before: Pose,
@@ -237,17 +220,7 @@ def cut(
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights,
-                    active,
-                    grid,
-                    planes,
-                    pose_before,
-                    pose_now,
-                    i,
-                    j,
-                    samples,
-                    room - entered,
-                    intake,
+                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
                 )
                 entered += more
                 lost += over
@@ -257,7 +230,7 @@ def cut(
 @kernel
 def set_ceiling(
     heights: Array,
-    active: Mask,
+    active: Flags,
     ceiling: Array,
     grid: Grid,
     planes: Array,

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from lerobot_excav.envs.soil.arrays import Array
 
 RAKE_MIN_RAD = math.radians(20.0)
 RAKE_MAX_RAD = math.radians(90.0)

@@ -8,9 +8,9 @@ motion: that decides how much of them acts, see `patches`.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parameters import SoilParameters
@@ -20,17 +20,11 @@ from lerobot_excav.envs.soil.pressure import PlatePressure
 from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
 from lerobot_excav.envs.soil.wedge import SoilStrength, edge_limits
 
-Array = NDArray[np.float64]
-
 
 def bearing_factors(friction_rad: float) -> tuple[float, float, float]:
     """Return the bearing capacity factors of cohesion, depth and width (Prandtl-Reissner, Vesic 1973)."""
     depth = math.exp(math.pi * math.tan(friction_rad)) * math.tan(math.pi / 4 + friction_rad / 2) ** 2
-    return (
-        (depth - 1.0) / math.tan(friction_rad),
-        depth,
-        2.0 * (depth + 1.0) * math.tan(friction_rad),
-    )
+    return ((depth - 1.0) / math.tan(friction_rad), depth, 2.0 * (depth + 1.0) * math.tan(friction_rad))
 
 
 def soil_strength(parameters: SoilParameters) -> SoilStrength:
@@ -46,6 +40,7 @@ def soil_strength(parameters: SoilParameters) -> SoilStrength:
         bearing_depth=depth,
         bearing_width=width,
         penetration_scale=p.penetration_scale,
+        table=failure_table(p.friction_angle_rad, p.steel_friction_angle_rad),
     )
 
 
@@ -67,10 +62,7 @@ def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, w
     spacing = depth_m / 100.0
     level: Array = np.full((2, 2), depth_m)
     grid = Grid.centred((2, 2), 2.0 * spacing, 2.0 * spacing)
-    table = failure_table(p.friction_angle_rad, p.steel_friction_angle_rad)
-    wedges, _ = edge_limits(
-        level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p), table
-    )
+    wedges, _ = edge_limits(level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p))
     angle = rake_rad + p.steel_friction_angle_rad
     return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
 
@@ -90,7 +82,6 @@ class SoilResistance:
     def __init__(self, parameters: SoilParameters, slices: int) -> None:
         self._slices = slices
         self._soil = soil_strength(parameters)
-        self._table = failure_table(parameters.friction_angle_rad, parameters.steel_friction_angle_rad)
         self.forget()
 
     def forget(self) -> None:
@@ -144,7 +135,7 @@ class SoilResistance:
         if self._pressure is None or self._geometry is None or not self._geometry.has_shape_of(geometry):
             self._geometry = geometry
             faces = OuterFaces.of(geometry, max(2, self._slices // 2))
-            self._pressure = PlatePressure(faces, self._soil, self._table)
+            self._pressure = PlatePressure(faces, self._soil)
         return self._pressure
 
     def _edge(
@@ -169,7 +160,6 @@ class SoilResistance:
             ahead,
             geometry.inner_width_m,
             self._soil,
-            self._table,
         )
         steel, shape = self._soil.steel_friction, edges.shape
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.

@@ -3,14 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lerobot_excav.envs.soil.arrays import Array, Bools, Flags
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.relaxation import mark_around, sweep
 from lerobot_excav.errors import require
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
 
 
 class Grid(NamedTuple):
@@ -104,7 +102,7 @@ def _tent(position: float) -> tuple[int, tuple[float, float, float, float]]:
 
 
 @kernel
-def _deposit(heights: Array, active: Mask, grid: Grid, points: Array, volumes: Array) -> None:
+def _deposit(heights: Array, active: Flags, grid: Grid, points: Array, volumes: Array) -> None:
     nx, ny = heights.shape
     area = grid.dx * grid.dy
     for k in range(len(points)):
@@ -131,7 +129,7 @@ class HeightField:
     def __init__(self, shape: tuple[int, int], cell_m: tuple[float, float], border_height_m: float) -> None:
         """Make an empty field centred at the origin of its plane; soil above the border height runs off it."""
         self.heights: Array = np.zeros(shape)
-        self.active: Mask = np.zeros(shape, dtype=np.uint8)
+        self.active: Flags = np.zeros(shape, dtype=np.uint8)
         self.ceiling: Array = np.full(shape, np.inf)
         self.grid = Grid.centred(shape, float(cell_m[0]), float(cell_m[1]))
         self._delta: Array = np.zeros(shape)
@@ -163,12 +161,10 @@ class HeightField:
         new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
         require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
         require(
-            bool(np.isfinite(new).all()),
-            "heights_m holds values that are not finite; give metres above the floor.",
+            bool(np.isfinite(new).all()), "heights_m holds values that are not finite; give metres above the floor."
         )
         require(
-            bool((new >= 0).all()),
-            f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.",
+            bool((new >= 0).all()), f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor."
         )
         self.heights[:] = new
         self.active[:] = 1
@@ -179,7 +175,7 @@ class HeightField:
         """Return the bilinear height [m] at (n, 2) points of the field's plane."""
         return _sample(self.heights, self.grid, np.ascontiguousarray(points, dtype=np.float64))
 
-    def contains(self, points: Array) -> NDArray[np.bool_]:
+    def contains(self, points: Array) -> Bools:
         """Tell which of (n, 2) points lie over the field."""
         half = 0.5 * np.array(self.heights.shape) * self.grid.cell_m
         return np.asarray((np.abs(points) < half).all(axis=-1))
@@ -215,13 +211,7 @@ class HeightField:
             if self._at_rest:
                 break
             over, changed = sweep(
-                self.heights,
-                self._delta,
-                self.active,
-                self.ceiling,
-                self.grid.cell_m,
-                slope_tan,
-                self._border_height_m,
+                self.heights, self._delta, self.active, self.ceiling, self.grid.cell_m, slope_tan, self._border_height_m
             )
             lost += over
             self._at_rest = changed == 0

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import Fidelity
 from lerobot_excav.envs.soil.height_field import HeightField
@@ -18,8 +18,6 @@ from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Landed, Population
 from lerobot_excav.envs.soil.parcels.store import WALLS
 from lerobot_excav.envs.soil.tool import ToolGeometry
-
-Array = NDArray[np.float64]
 
 _PHASE_PER_SUBSTEP = 0.2
 """Phase of a parcel on its contact spring per sub-step [rad] (tuned: stable up to a dozen contacts)."""
@@ -101,13 +99,7 @@ class LooseSoil:
         self._tool = ToolPath(0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3))
 
     def step(
-        self,
-        geometry: ToolGeometry | None,
-        before: Pose | None,
-        now: Pose | None,
-        dt_s: float,
-        *,
-        cutting: bool,
+        self, geometry: ToolGeometry | None, before: Pose | None, now: Pose | None, dt_s: float, *, cutting: bool
     ) -> float:
         """Move the parcels along with the bucket and let those at rest become ground.
 

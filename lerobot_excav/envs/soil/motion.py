@@ -6,12 +6,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.tool import Tool
-
-Array = NDArray[np.float64]
 
 
 class Pose(NamedTuple):
@@ -91,13 +89,6 @@ def _rotation_vector(rotation: Array) -> Array:
 
 def poses_between(before: Pose, now: Pose, steps: int) -> Iterator[tuple[Pose, Pose]]:
     """Yield the start and end poses of equal steps along a screw-free path: straight line, constant turn."""
-    turn = _rotation_vector(before.rotation.T @ now.rotation) if steps > 1 else np.zeros(3)
-    shares = [k / steps for k in range(1, steps)]
-    inner = [
-        Pose(
-            position=before.position + share * (now.position - before.position),
-            rotation=turned(before.rotation, turn, share),
-        )
-        for share in shares
-    ]
+    positions, rotations, _ = path(before, now, steps)
+    inner = map(Pose, positions[1:-1], rotations[1:-1])
     yield from pairwise([before, *inner, now])

@@ -12,9 +12,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
-
-Array = NDArray[np.float64]
 
 FULL_SHARE = 0.2
 """Share of the speed into a patch, or across it, from which on `Patches.wrench` gives the full force (guess)."""
@@ -75,13 +74,7 @@ class Patches:
     @classmethod
     def joined(cls, *parts: "Patches") -> "Patches":
         """Return the patches of all parts."""
-        return cls(
-            points_w=np.concatenate([part.points_w for part in parts]),
-            normals_w=np.concatenate([part.normals_w for part in parts]),
-            limits_n=np.concatenate([part.limits_n for part in parts]),
-            frictions=np.concatenate([part.frictions for part in parts]),
-            kinds=np.concatenate([part.kinds for part in parts]),
-        )
+        return cls(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])})
 
     def __len__(self) -> int:
         """Return the number of patches."""
@@ -95,13 +88,7 @@ class Patches:
     def of_kind(self, kind: PatchKind) -> "Patches":
         """Return the patches of one kind."""
         chosen = self.kinds == kind
-        return Patches(
-            points_w=self.points_w[chosen],
-            normals_w=self.normals_w[chosen],
-            limits_n=self.limits_n[chosen],
-            frictions=self.frictions[chosen],
-            kinds=self.kinds[chosen],
-        )
+        return Patches(**{name: array[chosen] for name, array in vars(self).items()})
 
     def wrench(self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array) -> tuple[Array, Array]:
         """Return force [N] and torque about the origin [N m] on a tool that moves on unhindered, both (3,).
@@ -122,13 +109,7 @@ class Patches:
 
 @kernel
 def patch_wrench(
-    points: Array,
-    normals: Array,
-    limits: Array,
-    frictions: Array,
-    origin: Array,
-    linear: Array,
-    angular: Array,
+    points: Array, normals: Array, limits: Array, frictions: Array, origin: Array, linear: Array, angular: Array
 ) -> tuple[Array, Array]:
     """Add up the forces of patches on a moving tool; arguments and result as in `Patches.wrench`."""
     force, torque = np.zeros(3), np.zeros(3)

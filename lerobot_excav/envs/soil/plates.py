@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.tool import ToolGeometry
-
-Array = NDArray[np.float64]
 
 PLATE_THICKNESS_M = 0.02
 """Thickness of the plates (guess: wear plate with its strips)."""
@@ -39,10 +37,7 @@ class OuterFaces:
         shell, sides = _shell_samples(geometry, rows), _side_samples(geometry)
         points, normals, areas, breadths = (np.concatenate(pair) for pair in zip(shell, sides, strict=True))
         return cls(
-            points_t=points + PLATE_THICKNESS_M * normals,
-            normals_t=normals,
-            areas_m2=areas,
-            breadths_m=breadths,
+            points_t=points + PLATE_THICKNESS_M * normals, normals_t=normals, areas_m2=areas, breadths_m=breadths
         )
 
 

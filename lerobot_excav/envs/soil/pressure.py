@@ -13,16 +13,14 @@ plate: the cut clears the inside of the plates, so soil that touches one reaches
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.tool import Tool
 from lerobot_excav.envs.soil.wedge import SoilStrength, table_row
-
-Array = NDArray[np.float64]
 
 SINKAGE_MODULUS = 1.53e6
 """Pressure at 1 m of sinkage [N/m^(n+2)] of a plate in dry sand; the part that depends on its breadth is below 1 %
@@ -37,15 +35,9 @@ FALL_REACH_M = 0.5
 
 @kernel
 def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) -> Array:
-    """Return how far the soil before each sample of the outer faces stands above it [m], at least 0.
+    """Return how far the soil before each of (m, 3) samples of the outer faces stands above it [m], at least 0.
 
-    It is read one cell outside of the face, in so far as the face is upright.
-
-    Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        points: (m, 3) samples; z above the rigid floor.
-        normals: (m, 3) unit vectors out of the bucket.
+    It is read one cell outside of the face, in so far as the face is upright; z counts from the rigid floor.
     """
     overlaps = np.zeros(len(points))
     for k in range(len(points)):
@@ -57,26 +49,14 @@ def plate_overlaps(heights: Array, grid: Grid, points: Array, normals: Array) ->
 
 @kernel
 def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
-    """Return the share of the bearing that is left on ground that falls off towards one side, (m,).
-
-    Args:
-        heights: (nx, ny) heights [m].
-        grid: First cell centre and cell sizes.
-        points: (m, 3) where the ground bears.
-    """
+    """Return the share of the bearing that is left at (m, 3) points on ground that falls off towards one side, (m,)."""
     factors = np.ones(len(points))
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         level = surface_height(heights, grid, x, y)
         lowest = min(
-            min(
-                surface_height(heights, grid, x - FALL_REACH_M, y),
-                surface_height(heights, grid, x + FALL_REACH_M, y),
-            ),
-            min(
-                surface_height(heights, grid, x, y - FALL_REACH_M),
-                surface_height(heights, grid, x, y + FALL_REACH_M),
-            ),
+            min(surface_height(heights, grid, x - FALL_REACH_M, y), surface_height(heights, grid, x + FALL_REACH_M, y)),
+            min(surface_height(heights, grid, x, y - FALL_REACH_M), surface_height(heights, grid, x, y + FALL_REACH_M)),
         )
         slope = min(max((level - lowest) / FALL_REACH_M, 0.0), 1.0)
         factors[k] = (1.0 - slope) ** 2
@@ -85,14 +65,7 @@ def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
 
 @kernel
 def plate_limits(
-    overlaps: Array,
-    sinkages: Array,
-    factors: Array,
-    normals: Array,
-    areas: Array,
-    breadths: Array,
-    soil: SoilStrength,
-    table: Array,
+    overlaps: Array, sinkages: Array, factors: Array, normals: Array, areas: Array, breadths: Array, soil: SoilStrength
 ) -> Array:
     """Return the greatest push [N] of the soil on each sample of the outer faces.
 
@@ -104,7 +77,6 @@ def plate_limits(
         areas: (m,) [m2].
         breadths: (m,) shares of the breadth of the footing [m].
         soil: What the soil can bear.
-        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
     limits = np.zeros(len(overlaps))
     contacts = np.minimum(1.0, overlaps / PLATE_THICKNESS_M)
@@ -112,7 +84,7 @@ def plate_limits(
     for k in range(len(overlaps)):
         if overlaps[k] > 0.0:
             upright = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
-            _, cohesion, surcharge = table_row(table, math.atan2(upright, normals[k, 2]))
+            _, cohesion, surcharge = table_row(soil.table, math.atan2(upright, normals[k, 2]))
             passive = (soil.unit_weight * overlaps[k] * surcharge + soil.cohesion * cohesion) * math.cos(
                 soil.steel_friction
             )
@@ -132,13 +104,11 @@ class PlatePressure:
     Args:
         faces: Samples of its outer faces.
         soil: What the soil can bear.
-        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
 
-    def __init__(self, faces: OuterFaces, soil: SoilStrength, table: Array) -> None:
+    def __init__(self, faces: OuterFaces, soil: SoilStrength) -> None:
         self._faces = faces
         self._soil = soil
-        self._table = table
         self._sinkages: Array = np.zeros(len(faces.areas_m2))
 
     def patches(self, heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, dt_s: float) -> Patches:
@@ -160,6 +130,5 @@ class PlatePressure:
             faces.areas_m2,
             faces.breadths_m,
             self._soil,
-            self._table,
         )
         return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

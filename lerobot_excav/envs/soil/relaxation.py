@@ -11,13 +11,11 @@ above the ceiling lies in or on that body and takes no part.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lerobot_excav.envs.soil.arrays import Array, Flags
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.errors import ExcavError, require
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
 
 FLOW_FRACTION = 0.1
 """Share of the excess height moved to each neighbour per sweep (tuned). Eight shares stay below 1, so heights
@@ -30,7 +28,7 @@ _MAX_SWEEPS = 200_000
 
 
 @kernel
-def mark_around(active: Mask, i: int, j: int) -> None:
+def mark_around(active: Flags, i: int, j: int) -> None:
     """Mark a column and its neighbours active."""
     nx, ny = active.shape
     for a in range(max(0, i - 1), min(nx, i + 2)):
@@ -77,7 +75,7 @@ def _column_outflow(
 def sweep(
     heights: Array,
     delta: Array,
-    active: Mask,
+    active: Flags,
     ceiling: Array,
     cell_m: tuple[float, float],
     slope_tan: float,
@@ -145,8 +143,7 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
         "heights_m has values that are not finite or below 0.",
     )
     require(
-        cell_size_m > 0 and slope_tan > 0,
-        f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0.",
+        cell_size_m > 0 and slope_tan > 0, f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0."
     )
     delta = np.zeros_like(heights)
     active = np.ones(heights.shape, dtype=np.uint8)

@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
+from lerobot_excav.envs.soil.arrays import Array, Bools
 from lerobot_excav.envs.soil.bucket import Bucket
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
@@ -15,8 +16,6 @@ from lerobot_excav.envs.soil.loose import LooseSoil
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.tool import Reaction, Tool
 from lerobot_excav.errors import require, require_choice
-
-Array = NDArray[np.float64]
 
 
 def _whole_cells(length_m: float, cell_size_m: float, field: str) -> int:
@@ -253,12 +252,12 @@ class Soil:
         return self._loose.population.state.masses.copy()
 
     @property
-    def parcel_is_load(self) -> NDArray[np.bool_]:
+    def parcel_is_load(self) -> Bools:
         """(n,) whether each parcel belongs to the load of the bucket."""
         return np.asarray(self._loose.population.state.load == 1)
 
     @property
-    def parcel_is_asleep(self) -> NDArray[np.bool_]:
+    def parcel_is_asleep(self) -> Bools:
         """(n,) whether each parcel rests in the bucket and moves with it as one body."""
         return np.asarray(self._loose.population.state.asleep == 1)
 

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.errors import require
-
-Array = NDArray[np.float64]
 
 _CONVEX_TOLERANCE_M2 = 1e-9
 
@@ -47,8 +46,7 @@ class ToolGeometry:
         )
         object.__setattr__(self, "profile_t", _fixed(points, points.shape, "profile_t"))
         require(
-            0.0 < self.inner_width_m < np.inf,
-            f"inner_width_m={self.inner_width_m!r}; allowed: above 0 and finite.",
+            0.0 < self.inner_width_m < np.inf, f"inner_width_m={self.inner_width_m!r}; allowed: above 0 and finite."
         )
         require(bool((points[:, 1] >= -1e-9).all()), "profile_t has z_t < 0; the shell lies on the +z side.")
         side = np.roll(points, -1, axis=0) - points

@@ -7,13 +7,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
-
-Array = NDArray[np.float64]
 
 EDGE_THICKNESS_M = 0.02
 """Thickness of the cutting edge (guess, typical of 8-t buckets)."""
@@ -43,6 +41,7 @@ class SoilStrength(NamedTuple):
         bearing_depth: Bearing factor of the depth [1].
         bearing_width: Bearing factor of the width [1].
         penetration_scale: Factor on the bearing of the cutting edge [1].
+        table: Rake, failure angle, cohesion and surcharge factor, see `earthmoving.failure_table`.
     """
 
     unit_weight: float
@@ -53,6 +52,7 @@ class SoilStrength(NamedTuple):
     bearing_depth: float
     bearing_width: float
     penetration_scale: float
+    table: Array
 
 
 @kernel
@@ -104,7 +104,6 @@ def wedge_force(
     ahead: tuple[float, float],
     width: float,
     soil: SoilStrength,
-    table: Array,
 ) -> float:
     """Return the force [N] at which the soil before one slice of the edge fails; formula in `earthmoving`.
 
@@ -112,7 +111,7 @@ def wedge_force(
     as level with the surface ahead.
     """
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
-    failure, cohesion_factor, _ = table_row(table, rake)
+    failure, cohesion_factor, _ = table_row(soil.table, rake)
     area = wedge_area(weighed, grid, edge, ahead, failure) + 0.5 * depth**2 / math.tan(rake)
     balance = math.sin(failure + soil.friction) / math.sin(rake + soil.steel_friction + failure + soil.friction)
     return float(soil.unit_weight * area * width * balance + soil.cohesion * depth * width * cohesion_factor)
@@ -140,7 +139,6 @@ def edge_limits(
     ahead: tuple[float, float],
     width: float,
     soil: SoilStrength,
-    table: Array,
 ) -> tuple[Array, Array]:
     """Return the forces [N] at which soil fails before each slice of the edge, and at which it yields to the slice.
 
@@ -153,7 +151,6 @@ def edge_limits(
         ahead: Level unit direction in which soil lies before the edge.
         width: Width of the whole edge [m].
         soil: What the soil can bear.
-        table: (n, 4) rake, failure angle, cohesion and surcharge factor.
     """
     count = len(edges)
     wedges, bearings = np.zeros(count), np.zeros(count)
@@ -165,6 +162,6 @@ def edge_limits(
         depth = surface_height(heights, grid, x, y) - edge[2]
         if depth > 0.0:
             share = width / count
-            wedges[k] = wedge_force(weighed, grid, edge, depth, rake, ahead, share, soil, table)
+            wedges[k] = wedge_force(weighed, grid, edge, depth, rake, ahead, share, soil)
             bearings[k] = min(edge_bearing(depth, share, soil), PENETRATION_CAP_N / count)
     return wedges, bearings

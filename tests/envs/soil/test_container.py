@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -32,7 +33,11 @@ def test_overlap_with_the_dig_area(placed, overlaps):
     assert placed.overlaps((6.0, 6.0)) is overlaps
 
 
-@pytest.mark.parametrize("height", [0.0, math.nan, math.inf])
-def test_a_box_without_walls_or_with_endless_ones_is_refused(height):
-    with pytest.raises(ConfigurationError, match="wall_height_m"):
-        Container(center_w=np.zeros(3), half_extent_m=np.ones(2), wall_height_m=height, yaw_rad=0.0)
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("wall_height_m", bad) for bad in (0.0, math.nan, math.inf)]
+    + [("center_w", np.zeros(2)), ("half_extent_m", np.array([1.0, 0.0])), ("yaw_rad", math.nan)],
+)
+def test_a_box_that_cannot_be_is_refused(field, value):
+    with pytest.raises(ConfigurationError, match=field):
+        dataclasses.replace(box(), **{field: value})

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET, rotation_at
 from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Intake
 from validation.soil.reference import bucket as reference
+from validation.soil.reference.worlds import flat
 
 CELL = 0.05
 PARCEL_RADIUS = 0.045
@@ -21,12 +21,6 @@ def rotation(yaw, pitch, roll):
     about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
     about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
     return about_z @ rotation_at(pitch) @ about_x
-
-
-def flat(height):
-    field = HeightField((60, 60), (CELL, CELL), 0.0)
-    field.reset(np.full((60, 60), height))
-    return field
 
 
 def pose(edge, turned):
@@ -77,8 +71,8 @@ def test_a_point_came_through_the_face_that_the_reference_finds(before, mix):
 )
 @settings(max_examples=60)
 def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(angles, edge, step, room):
-    turned, field = rotation(*angles), flat(0.5)
-    before, now = pose(edge, turned), pose(tuple(np.add(edge, step)), turned)
+    turned, field = rotation(*angles), flat(0.5, 60)
+    before, now = pose(edge, turned), pose(np.add(edge, step), turned)
     volume, intake = field.volume_m3, Intake(BUCKET, PARCEL_RADIUS)
     entered, lost = move(field, before, now, room, intake=intake)
     assert intake.waiting_m3 == pytest.approx(entered, abs=1e-12)
@@ -93,62 +87,42 @@ def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(angles, edge, st
                 assert field.heights[i, j] <= max(low, 0.0) + 1e-9
 
 
-def test_soil_before_the_opening_enters():
-    turned, field = rotation_at(math.radians(-120)), flat(0.5)
-    entered, _ = move(field, pose((0.0, 0.0, 0.2), turned), pose((-0.025, 0.0, 0.2), turned))
-    assert entered > 0.0
-
-
-def test_soil_behind_the_shell_is_pushed_not_loaded():
-    turned, field = rotation_at(math.radians(-90)), flat(0.5)
-    start = pose((0.0, 0.0, 0.2), turned)
-    move(field, start, start)  # clear the bucket first
-    ahead = field.heights[:, 30].copy()
-    entered, _ = move(field, start, pose((0.05, 0.0, 0.2), turned))
-    assert entered == 0.0
-    assert (field.heights[:, 30] - ahead).max() > 0.0  # it piles up behind the back
-
-
-def test_a_side_plate_pushes_sideways():
-    turned, field = rotation_at(math.radians(-150)), flat(0.5)
-    start = pose((-0.3, 0.0, 0.2), turned)
-    while move(field, start, start)[0] > 0.0:
-        pass  # soil above the opening falls in
-    before = field.heights.copy()
-    entered, _ = move(field, start, pose((-0.3, 0.05, 0.2), turned))
-    grown = np.argwhere(field.heights > before + 1e-12)
-    assert entered == pytest.approx(0.0, abs=1e-12)
-    assert len(grown) > 0
-    assert (field.centres(1)[grown[:, 1]] > 0.36).all()
-
-
-def test_a_full_bucket_pushes_a_heap_before_it():
-    turned, field = rotation_at(math.radians(-120)), flat(0.5)
-    start = pose((0.0, 0.0, 0.2), turned)
-    move(field, start, start)  # clear the bucket first
-    before = field.heights.copy()
-    entered, _ = move(field, start, pose((-0.05, 0.0, 0.2), turned), room=0.0)
-    raised = np.argwhere(field.heights > before + 1e-12)
-    assert entered == 0.0
-    assert len(raised) > 0
-    assert (field.centres(0)[raised[:, 0]] < -0.05).all()
-
-
-def test_more_bins_see_a_thinner_layer():
+def test_soil_before_the_opening_enters_and_more_bins_see_a_thinner_layer():
     """Two samples per column decide for half a column at a time, eight see the corner of the opening."""
     turned = rotation_at(math.radians(-135))
-    amounts = [
-        move(flat(0.5), pose((0.0, 0.0, 0.2), turned), pose((-0.02, 0.0, 0.16), turned), bins=bins)[0]
+    coarse, fine = (
+        move(flat(0.5, 60), pose((0.0, 0.0, 0.2), turned), pose((-0.02, 0.0, 0.16), turned), bins=bins)[0]
         for bins in (2, 8)
-    ]
-    assert amounts[0] != amounts[1]
-    assert amounts[0] == pytest.approx(amounts[1], rel=0.2)
+    )
+    assert coarse != fine
+    assert coarse == pytest.approx(fine, rel=0.2)
+    assert fine > 0.0
+
+
+@pytest.mark.parametrize(
+    ("pitch_deg", "start", "step", "room", "axis", "least"),
+    [
+        (-90, (0.0, 0.0, 0.2), (0.05, 0.0, 0.0), 1.0, 0, -0.01),  # behind the back
+        (-150, (-0.3, 0.0, 0.2), (0.0, 0.05, 0.0), 1.0, 1, 0.36),  # beside a side plate
+        (-120, (0.0, 0.0, 0.2), (-0.05, 0.0, 0.0), 0.0, 0, None),  # a full bucket: before it
+    ],
+)
+def test_what_cannot_enter_piles_up_on_the_side_to_which_the_bucket_moves(pitch_deg, start, step, room, axis, least):
+    turned, field = rotation_at(math.radians(pitch_deg)), flat(0.5, 60)
+    before, now = pose(start, turned), pose(np.add(start, step), turned)
+    while move(field, before, before)[0] > 0.0:
+        pass  # soil above the opening falls in
+    heights = field.heights.copy()
+    entered, _ = move(field, before, now, room)
+    grown = field.centres(axis)[np.argwhere(field.heights > heights + 1e-12)[:, axis]]
+    assert entered == pytest.approx(0.0, abs=1e-12)
+    assert len(grown) > 0
+    assert grown.max() < -0.05 if least is None else grown.min() > least
 
 
 def test_soil_over_the_border_is_counted():
-    turned, field = rotation_at(math.radians(-120)), flat(0.5)
-    volume = field.volume_m3
-    edge = -1.5 + 0.06
+    turned, field = rotation_at(math.radians(-120)), flat(0.5, 60)
+    volume, edge = field.volume_m3, -1.5 + 0.06
     _, lost = move(field, pose((edge, 0.0, 0.2), turned), pose((edge - 0.05, 0.0, 0.2), turned), room=0.0)
     assert lost > 0.0
     assert field.volume_m3 + lost == pytest.approx(volume, abs=1e-12)

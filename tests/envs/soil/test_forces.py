@@ -10,32 +10,27 @@ from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import SoilResistance, bearing_factors, blade_force_n
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.wedge import PENETRATION_CAP_N
+from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
 FULL_SPEED = np.array([-1.0, 0.0, 0.0])
 PLATE_RAD = math.atan2(0.39, -0.39)
 """Direction of the bottom plate in the tool frame: 135 degrees."""
 
-EMPTY_COM_T = np.array([0.5, 0.0, 0.3])
+INTO = np.array([-1.0, 0.0, -1.0]) / math.sqrt(2)
+"""Straight along a plate with a rake of 45 degrees."""
 
 
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
-
-
-def answer(resistance, field, tool, floor_depth_m=0.0, payload=(0.0, EMPTY_COM_T)):
-    return resistance.react(field.heights, field.heights, field.grid, tool, floor_depth_m, TICK_S, *payload)
+def answer(resistance, field, tool, floor_depth_m=0.0):
+    empty = 0.0, np.array([0.5, 0.0, 0.3])
+    return resistance.react(field.heights, field.heights, field.grid, tool, floor_depth_m, TICK_S, *empty)
 
 
 def react(parameters, field, tool, floor_depth_m=0.0):
-    resistance = SoilResistance(parameters, 8)
-    return answer(resistance, field, tool, floor_depth_m)
+    return answer(SoilResistance(parameters, 8), field, tool, floor_depth_m)
 
 
 def force(parameters, field, tool, *kinds):
@@ -51,68 +46,65 @@ def dragged(rake_deg, depth, velocity=FULL_SPEED):
     return tool_at(np.array([0.0, 0.0, 1.0 - depth]), pitch, velocity, 0.0)
 
 
+def earthmoving_n(soil, depth, rake_rad, width):
+    """The fundamental equation of earthmoving: backward and downward part."""
+    friction, steel = soil.friction_angle_rad, soil.steel_friction_angle_rad
+    factors = earthmoving_factors(rake_rad, failure_angle(rake_rad, friction, steel), friction, steel)
+    weight = soil.density_kg_m3 * GRAVITY_M_S2 * depth**2 * factors.weight
+    size = (weight + soil.cohesion_pa * depth * factors.cohesion) * width
+    return size * np.array([math.sin(rake_rad + steel), math.cos(rake_rad + steel)])
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 2000.0])
 @pytest.mark.parametrize("rake", [25.0, 35.0, 45.0])
 @pytest.mark.parametrize("depth", [0.1, 0.2, 0.4])
-def test_flat_ground_gives_the_fundamental_equation_of_earthmoving(rake, depth):
-    friction, steel = SAND.friction_angle_rad, SAND.steel_friction_angle_rad
-    failure = failure_angle(math.radians(rake), friction, steel)
-    factor = earthmoving_factors(math.radians(rake), failure, friction, steel).weight
-    expected = SAND.density_kg_m3 * GRAVITY_M_S2 * depth**2 * factor * BUCKET.inner_width_m
-    found = force(SAND, flat(), dragged(rake, depth), PatchKind.WEDGE)
-    assert np.linalg.norm(found) == pytest.approx(expected, rel=0.01)
-    assert found[0] == pytest.approx(expected * math.sin(math.radians(rake) + steel), rel=0.01)
-    assert found[2] == pytest.approx(-expected * math.cos(math.radians(rake) + steel), rel=0.01)
+def test_flat_ground_gives_the_fundamental_equation_of_earthmoving(rake, depth, cohesion):
+    soil = dataclasses.replace(SAND, cohesion_pa=cohesion)
+    back, down = earthmoving_n(soil, depth, math.radians(rake), BUCKET.inner_width_m)
+    found = force(soil, flat(), dragged(rake, depth), PatchKind.WEDGE)
+    np.testing.assert_allclose(found, [back, 0.0, -down], atol=0.01 * math.hypot(back, down))
 
 
-@given(rake=st.floats(0.3, 1.4), depth=st.floats(0.02, 0.3), by=st.floats(0.2, 3.0))
+@given(
+    rake=st.floats(0.4, 1.4),
+    depth=st.floats(0.02, 0.3),
+    width=st.floats(0.2, 3.0),
+    density=st.floats(500.0, 3000.0),
+    cohesion=st.floats(0.0, 5000.0),
+)
 @settings(max_examples=30)
-def test_the_force_scales_with_density_width_and_square_of_depth(rake, depth, by):
-    once = blade_force_n(SAND, depth, rake, 0.7)
-    heavier = dataclasses.replace(SAND, density_kg_m3=SAND.density_kg_m3 * by)
-    np.testing.assert_allclose(blade_force_n(heavier, depth, rake, 0.7), by * once, rtol=1e-9)
-    np.testing.assert_allclose(blade_force_n(SAND, depth, rake, 0.7 * by), by * once, rtol=1e-9)
-    np.testing.assert_allclose(blade_force_n(SAND, depth * by, rake, 0.7), by**2 * once, rtol=1e-9)
-
-
-def test_cohesion_adds_its_term():
-    sticky = dataclasses.replace(SAND, cohesion_pa=2000.0)
-    rake, depth = math.radians(40.0), 0.3
-    failure = failure_angle(rake, SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
-    factor = earthmoving_factors(rake, failure, SAND.friction_angle_rad, SAND.steel_friction_angle_rad).cohesion
-    more = force(sticky, flat(), dragged(40, depth), PatchKind.WEDGE)
-    more -= force(SAND, flat(), dragged(40, depth), PatchKind.WEDGE)
-    assert np.linalg.norm(more) == pytest.approx(2000.0 * depth * BUCKET.inner_width_m * factor, rel=0.01)
-
-
-def test_the_weight_of_a_heap_ahead_counts():
-    heaped = flat()
-    heaped.heights[:50] += 0.3
-    assert np.linalg.norm(force(SAND, heaped, dragged(40, 0.3), PatchKind.WEDGE)) > 1.5 * np.linalg.norm(
-        force(SAND, flat(), dragged(40, 0.3), PatchKind.WEDGE)
+def test_a_blade_meets_the_fundamental_equation_of_earthmoving(rake, depth, width, density, cohesion):
+    soil = dataclasses.replace(SAND, density_kg_m3=density, cohesion_pa=cohesion)
+    np.testing.assert_allclose(
+        blade_force_n(soil, depth, rake, width), earthmoving_n(soil, depth, rake, width), rtol=0.01
     )
 
 
-def test_the_edge_bears_more_as_it_goes_deeper_over_the_ramp():
+def test_a_heap_ahead_counts_and_turns_the_bucket_if_it_is_on_one_side():
+    tool, level, heaped, one_sided = dragged(40, 0.3), flat(), flat(), flat()
+    heaped.heights[:50] += 0.3
+    one_sided.heights[:, 60:] += 0.3
+    more, less = (np.linalg.norm(force(SAND, field, tool, PatchKind.WEDGE)) for field in (heaped, level))
+    assert more > 1.5 * less
+    assert abs(react(SAND, one_sided, tool).torque_w_nm[2]) > 100.0
+
+
+def bearing(depth, scale=1.0):
+    soil = dataclasses.replace(SAND, penetration_scale=scale)
+    return -float(force(soil, flat(), dragged(45, depth, INTO), PatchKind.PENETRATION) @ INTO)
+
+
+def test_the_edge_bears_more_as_it_goes_deeper_over_the_ramp_and_to_a_cap():
     """Straight in, against bearing theory times a ramp from 10 to 100 percent over 0.2 m."""
-    into = np.array([-1.0, 0.0, -1.0]) / math.sqrt(2)
     _, depth_factor, width_factor = bearing_factors(SAND.friction_angle_rad)
     assert depth_factor == pytest.approx(56.0, rel=0.01)
     assert width_factor == pytest.approx(92.2, rel=0.01)
     area = (0.02 + 5 * 0.06 * 0.015 / 0.7) * BUCKET.inner_width_m
     for depth, ramp in ((0.1, 0.55), (0.2, 1.0), (0.3, 1.0)):
         stress = SAND.density_kg_m3 * GRAVITY_M_S2 * (depth * depth_factor + 0.5 * 0.02 * width_factor)
-        found = force(SAND, flat(), dragged(45, depth, into), PatchKind.PENETRATION)
-        assert -(found @ into) == pytest.approx(ramp * stress * area, rel=0.01)
-
-
-def test_the_penetration_scale_scales_and_the_cap_limits():
-    def bearing(scale, depth):
-        soil = dataclasses.replace(SAND, penetration_scale=scale)
-        into = np.array([-1.0, 0.0, -1.0]) / math.sqrt(2)
-        return float(np.linalg.norm(force(soil, flat(), dragged(45, depth, into), PatchKind.PENETRATION)))
-
-    assert bearing(2.0, 0.2) == pytest.approx(2 * bearing(1.0, 0.2))
-    assert bearing(99.0, 0.4) == pytest.approx(PENETRATION_CAP_N, rel=1e-3)
+        assert bearing(depth) == pytest.approx(ramp * stress * area, rel=0.01)
+    assert bearing(0.2, scale=2.0) == pytest.approx(2 * bearing(0.2))
+    assert bearing(0.4, scale=99.0) == pytest.approx(PENETRATION_CAP_N, rel=1e-3)
 
 
 @given(
@@ -127,6 +119,7 @@ def test_the_soil_never_drives_the_bucket(pitch, depth, velocity, turning):
     tool = tool_at(edge, pitch, np.array(velocity), turning)
     reaction = react(SAND, flat(), tool)
     assert np.isfinite([*reaction.force_w_n, *reaction.torque_w_nm]).all()
+    np.testing.assert_allclose(reaction.force_w_n, force(SAND, flat(), tool, *PatchKind), rtol=1e-9, atol=1e-9)
     power = reaction.force_w_n @ tool.linear_velocity_w + reaction.torque_w_nm @ tool.angular_velocity_w
     assert power <= 1e-9
 
@@ -145,9 +138,8 @@ def test_what_the_soil_can_hold_depends_on_the_pose_and_not_on_the_motion(pitch,
 
 def test_the_force_is_continuous_in_the_direction_of_a_deep_scrape():
     angles = np.radians(np.arange(90.0, 271.0, 0.25))
-    deep = [
-        force(SAND, flat(), dragged(20, 0.8, np.array([math.cos(a), 0.0, math.sin(a)])), *PatchKind) for a in angles
-    ]
+    field, ways = flat(), np.stack([np.cos(angles), 0.0 * angles, np.sin(angles)], axis=1)
+    deep = [force(SAND, field, dragged(20, 0.8, way), *PatchKind) for way in ways]
     jumps = np.linalg.norm(np.diff(deep, axis=0), axis=1)
     assert jumps.max() < 0.05 * np.linalg.norm(deep, axis=1).max()
 
@@ -159,66 +151,26 @@ def test_a_bucket_at_rest_feels_nothing_and_its_edge_leaves_freely():
     assert np.linalg.norm(force(SAND, flat(), out, *edge)) < 1e-9
 
 
-def test_the_torque_is_that_of_the_force_at_the_edge():
-    tool = dragged(40, 0.3)
-    wedge = react(SAND, flat(), tool).patches.of_kind(PatchKind.WEDGE)
-    found, torque = wedge.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
-    arm = tool.rotation_w @ np.array([1.15, 0.0, 0.0])
-    np.testing.assert_allclose(torque, np.cross(arm, found), atol=1e-6)
-
-
-def test_a_one_sided_heap_turns_the_bucket():
-    tool, field = dragged(40, 0.3), flat()
-    field.heights[:, 60:] += 0.3
-    assert abs(react(SAND, field, tool).torque_w_nm[2]) > 100.0
-
-
-def test_the_wrench_is_the_sum_of_its_patches_at_the_present_velocity():
-    tool = dragged(40, 0.3, np.array([-0.7, 0.2, -0.4]))
-    reaction = react(SAND, flat(), tool)
-    assert len(reaction.patches.of_kind(PatchKind.PRESSURE)) > 0
-    np.testing.assert_allclose(reaction.force_w_n, force(SAND, flat(), tool, *PatchKind), rtol=1e-9)
-
-
 def test_the_world_floor_depth_shifts_the_force_only():
-    deep = 0.7
     tool = dragged(40, 0.3)
-    lower = tool_at(np.array([0.0, 0.0, 0.7 - deep]), tool.pitch_rad, FULL_SPEED, 0.0)
-    same = react(SAND, flat(), lower, deep)
-    np.testing.assert_allclose(same.force_w_n, react(SAND, flat(), tool).force_w_n, rtol=1e-9)
-    np.testing.assert_allclose(same.torque_w_nm, react(SAND, flat(), tool).torque_w_nm, rtol=1e-9)
+    lower = tool_at(np.array([0.0, 0.0, 0.7 - 0.7]), tool.pitch_rad, FULL_SPEED, 0.0)
+    one, other = react(SAND, flat(), tool), react(SAND, flat(), lower, 0.7)
+    np.testing.assert_allclose(other.force_w_n, one.force_w_n, rtol=1e-9)
+    np.testing.assert_allclose(other.torque_w_nm, one.torque_w_nm, rtol=1e-9)
 
 
-def test_the_reaction_says_what_the_bucket_holds():
-    com = np.array([0.6, 0.1, 0.2])
-    found = answer(SoilResistance(SAND, 8), flat(), dragged(40, 0.3), payload=(321.0, com))
-    assert found.payload_mass_kg == 321.0
-    np.testing.assert_array_equal(found.payload_com_t, com)
-
-
-def test_a_bucket_that_was_away_has_not_sunk_in():
+def test_a_bucket_remembers_how_far_it_has_sunk_in_unless_it_was_away():
+    """Also one that is described by another geometry of the same shape in every step."""
     field, resistance = flat(), SoilResistance(SAND, 8)
     tool = tool_at(np.array([0.0, 0.0, 1.0]), -math.pi, np.array([0.0, 0.0, -1.0]), 0.0)
+    alike = dataclasses.replace(tool, geometry=dataclasses.replace(BUCKET))
 
-    def held():
+    def held(tool):
         return float(answer(resistance, field, tool).patches.limits_n.sum())
 
-    first, second = held(), held()
+    sunk = [held(t) for t in (tool, tool, tool)]
     resistance.forget()
-    assert second > first == held()
-
-
-def test_a_bucket_described_anew_remembers_how_far_it_has_sunk_in():
-    field, velocity = flat(), np.array([0.0, 0.0, -1.0])
-    tool = tool_at(np.array([0.0, 0.0, 1.0]), -math.pi, velocity, 0.0)
-    limits = []
-    for anew in (False, True):
-        resistance = SoilResistance(SAND, 8)
-        for _ in range(3):
-            geometry = dataclasses.replace(BUCKET) if anew else BUCKET
-            reaction = answer(resistance, field, dataclasses.replace(tool, geometry=geometry))
-        limits.append(reaction.patches.limits_n)
-    np.testing.assert_array_equal(*limits)
+    assert [held(t) for t in (tool, alike, tool)] == sunk == sorted(set(sunk))
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
-from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle, failure_table
+from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import bearing_factors, soil_strength
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M, OuterFaces
 from lerobot_excav.envs.soil.pressure import (
@@ -20,55 +19,35 @@ from lerobot_excav.envs.soil.pressure import (
     plate_limits,
     plate_overlaps,
 )
+from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
 SOIL = soil_strength(SAND)
-TABLE = failure_table(SAND.friction_angle_rad, SAND.steel_friction_angle_rad)
 WEIGHT = SAND.density_kg_m3 * GRAVITY_M_S2
 DOWN, LEVEL = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0]])
 
 
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
+def limit(overlap, sinkage, normal, area=0.1, breadth=0.3, factor=1.0, soil=SOIL):
+    before, after = (np.array([[value] for value in part]) for part in ((overlap, sinkage, factor), (area, breadth)))
+    return float(plate_limits(*before, normal, *after, soil)[0])
 
 
-def limit(overlap, sinkage, normal, area=0.1, breadth=0.3, factor=1.0):
-    found = plate_limits(
-        np.array([overlap]),
-        np.array([sinkage]),
-        np.array([factor]),
-        normal,
-        np.array([area]),
-        np.array([breadth]),
-        SOIL,
-        TABLE,
-    )
-    return float(found[0])
+FACES = OuterFaces.of(BUCKET, 4)
 
 
 def heel_down(height, velocity=(0.0, 0.0, -0.5)):
     """The bucket with its opening level on top and its lowest plate at a height."""
-    pitch = -math.pi
-    lowest = tool_at(np.zeros(3), pitch, np.zeros(3), 0.0)
-    faces = OuterFaces.of(BUCKET, 4)
-    bottom = float((lowest.position_w + faces.points_t @ lowest.rotation_w.T)[:, 2].min())
-    return tool_at(np.array([0.0, 0.0, height - bottom]), pitch, np.array(velocity), 0.0)
-
-
-def pressure():
-    return PlatePressure(OuterFaces.of(BUCKET, 4), SOIL, TABLE)
+    lowest = tool_at(np.zeros(3), -math.pi, np.zeros(3), 0.0)
+    bottom = float((lowest.position_w + FACES.points_t @ lowest.rotation_w.T)[:, 2].min())
+    return tool_at(np.array([0.0, 0.0, height - bottom]), -math.pi, np.array(velocity), 0.0)
 
 
 def press_in(field, depths):
     """Press the bucket down on flat ground to some depths, in turn."""
-    found, plates, before = [], pressure(), -0.01
-    for depth in depths:
-        tool = heel_down(1.0 - depth, (0.0, 0.0, -(depth - before) / TICK_S))
-        found.append(plates.patches(field.heights, field.grid, tool, 0.0, TICK_S))
-        before = float(depth)
-    return found
+    plates = PlatePressure(FACES, SOIL)
+    for depth, way in zip(depths, np.diff(depths, prepend=-0.01), strict=True):
+        tool = heel_down(1.0 - depth, (0.0, 0.0, -way / TICK_S))
+        yield plates.patches(field.heights, field.grid, tool, 0.0, TICK_S)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -114,9 +93,8 @@ def test_an_upright_plate_meets_the_fundamental_equation_of_earthmoving():
 
 def test_cohesion_adds_to_an_upright_plate_what_the_equation_says():
     sticky = SOIL._replace(cohesion=2000.0)
-    args = (np.array([0.2]), np.zeros(1), np.ones(1), LEVEL, np.array([0.1]), np.zeros(1))
-    more = plate_limits(*args, sticky, TABLE)[0] - plate_limits(*args, SOIL, TABLE)[0]
-    assert more == pytest.approx(0.1 * 2000.0 * TABLE[-1, 2] * math.cos(SAND.steel_friction_angle_rad))
+    more = limit(0.2, 0.0, LEVEL, breadth=0.0, soil=sticky) - limit(0.2, 0.0, LEVEL, breadth=0.0)
+    assert more == pytest.approx(0.1 * 2000.0 * SOIL.table[-1, 2] * math.cos(SAND.steel_friction_angle_rad))
 
 
 @pytest.mark.parametrize("normal", [DOWN, LEVEL, np.array([[0.6, 0.0, -0.8]]), np.array([[0.0, 0.6, 0.8]])])
@@ -141,37 +119,28 @@ def test_the_ground_bears_less_beside_a_slope():
 
 
 def test_a_bucket_above_the_ground_feels_nothing_and_one_that_is_pressed_in_ever_more():
-    field = flat()
-    sizes = [patches.limits_n.sum() for patches in press_in(field, np.linspace(-0.01, 0.25, 53))]
+    found = list(press_in(flat(), np.linspace(-0.01, 0.25, 53)))
+    sizes = [patches.limits_n.sum() for patches in found]
     above, below = sizes[:3], sizes[3:]
     assert not np.any(above)
     assert (np.diff(below) > 0.0).all()
     assert np.diff(below).max() < 0.1 * below[-1]
     assert below[-1] > 20e3
+    assert all((patches.normals_w[:, 2] > -1e-9).all() for patches in found)  # out of the ground, into the bucket
+    assert found[-1].frictions == pytest.approx(math.tan(SAND.steel_friction_angle_rad))
 
 
 def test_the_sinkage_is_forgotten_when_the_plate_leaves_the_ground():
-    field, plates = flat(), pressure()
-    down = heel_down(0.9, (0.0, 0.0, -1.0))
-    sizes = []
-    for tool in (down, down, down, heel_down(1.1, (0.0, 0.0, 1.0)), down):
-        sizes.append(plates.patches(field.heights, field.grid, tool, 0.0, TICK_S).limits_n.sum())
+    sizes = [patches.limits_n.sum() for patches in press_in(flat(), [0.1, 0.11, 0.12, -0.01, 0.1])]
     assert sizes[0] < sizes[1] < sizes[2]
-    assert sizes[3] == 0.0
-    assert sizes[4] == sizes[0]
-
-
-def test_the_ground_pushes_out_of_itself_and_into_the_bucket():
-    for patches in press_in(flat(), np.array([0.05, 0.1])):
-        assert (patches.normals_w[:, 2] > -1e-9).all()
-        assert np.tan(SAND.steel_friction_angle_rad) == pytest.approx(patches.frictions[0])
+    assert sizes[3:] == [0.0, pytest.approx(sizes[0])]
 
 
 def test_soil_on_one_side_pushes_to_the_other():
     field = flat(0.0)
     field.heights[:, 68:] = 1.0  # beyond the left side plate only
     tool = heel_down(0.3, (0.0, 1.0, 0.0))
-    patches = pressure().patches(field.heights, field.grid, tool, 0.0, TICK_S)
+    patches = PlatePressure(FACES, SOIL).patches(field.heights, field.grid, tool, 0.0, TICK_S)
     assert len(patches) > 0
     np.testing.assert_allclose(patches.normals_w, np.tile([0.0, -1.0, 0.0], (len(patches), 1)), atol=1e-9)
     assert patches.wrench(tool.position_w, tool.linear_velocity_w, np.zeros(3))[0][1] < -500.0

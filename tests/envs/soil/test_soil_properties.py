@@ -1,5 +1,6 @@
 """What must hold for any motion of the bucket, for every soil and fidelity."""
 
+import dataclasses
 import itertools
 import math
 
@@ -10,8 +11,9 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil, Tool
+from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Container, Soil
 from lerobot_excav.envs.soil.relaxation import REST_TAN
+from validation.soil.reference.avalanche import steepest
 from validation.soil.reference.plates import nearest_point, plate_polygons
 
 TICKS = 120
@@ -26,20 +28,11 @@ seeds = st.integers(0, 2**32 - 1)
 
 def random_soil(preset, fidelity, rng, floor_depth_m):
     box = Container(
-        center_w=np.array([-2.4, 0.0, 0.0]),
-        half_extent_m=np.array([0.6, 0.6]),
-        wall_height_m=0.4,
-        yaw_rad=0.2,
+        center_w=np.array([-2.4, 0.0, 0.0]), half_extent_m=np.array([0.6, 0.6]), wall_height_m=0.4, yaw_rad=0.2
     )
     shape = (round(EXTENT_M / CELL_M),) * 2
     soil = Soil(
-        preset,
-        (EXTENT_M, EXTENT_M),
-        CELL_M,
-        fidelity,
-        int(rng.integers(1000)),
-        box,
-        floor_depth_m=floor_depth_m,
+        preset, (EXTENT_M, EXTENT_M), CELL_M, fidelity, int(rng.integers(1000)), box, floor_depth_m=floor_depth_m
     )
     x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
     pile = np.clip(rng.uniform(0.4, 1.1) - rng.uniform(0.2, 0.8) * np.hypot(x, y), 0.0, None)
@@ -50,13 +43,10 @@ def random_soil(preset, fidelity, rng, floor_depth_m):
 def swung(tool, yaw_rad, yaw_rate):
     """Turn a tool about the world's z axis."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    turn, spin = (
-        np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]),
-        np.array([0.0, 0.0, yaw_rate]),
-    )
+    turn, spin = (np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, yaw_rate]))
     position = turn @ tool.position_w
-    return Tool(
-        geometry=tool.geometry,
+    return dataclasses.replace(
+        tool,
         position_w=position,
         rotation_w=turn @ tool.rotation_w,
         linear_velocity_w=turn @ tool.linear_velocity_w + np.cross(spin, position),
@@ -103,14 +93,6 @@ def distance_to_plates(points_t):
     return np.minimum(to_shell, to_cheeks)
 
 
-def steepest(heights):
-    slopes = [np.abs(np.diff(heights, axis=axis)).max() / CELL_M for axis in (0, 1)]
-    diagonal = CELL_M * math.sqrt(2.0)
-    slopes.append(np.abs(heights[1:, 1:] - heights[:-1, :-1]).max() / diagonal)
-    slopes.append(np.abs(heights[1:, :-1] - heights[:-1, 1:]).max() / diagonal)
-    return max(slopes)
-
-
 def assert_sound(soil, total):
     """The books balance, nothing is negative, everything is a number."""
     ledger = soil.ledger_kg()
@@ -119,12 +101,7 @@ def assert_sound(soil, total):
     assert soil.heights_m.min() >= 0.0
     assert soil.container_heights_m.min() >= 0.0
     assert (soil.parcel_masses_kg > 0.0).all()
-    for values in (
-        soil.heights_m,
-        soil.container_heights_m,
-        soil.parcel_positions_w,
-        soil.parcel_velocities_w,
-    ):
+    for values in (soil.heights_m, soil.container_heights_m, soil.parcel_positions_w, soil.parcel_velocities_w):
         assert np.isfinite(values).all()
     assert math.isfinite(soil.mechanical_energy_j())
 
@@ -178,7 +155,7 @@ def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fideli
     assert speed < 0.01
     assert soil.heights_m.tobytes() == before
     assert_sound(soil, total)
-    assert steepest(soil.heights_m) <= soil.parameters.slope_tan + REST_TAN + 1e-9
+    assert steepest(soil.heights_m, CELL_M) <= soil.parameters.slope_tan + REST_TAN + 1e-9
 
 
 @given(points=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20))

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,15 +10,16 @@ from lerobot_excav.errors import ConfigurationError
 TRIANGLE = np.array([(1.0, 0.0), (0.5, 0.5), (0.0, 0.0)])
 
 
+POSE = {
+    "position_w": np.zeros(3),
+    "rotation_w": np.eye(3),
+    "linear_velocity_w": np.zeros(3),
+    "angular_velocity_w": np.zeros(3),
+}
+
+
 def tool(**changes):
-    values: dict[str, object] = {
-        "geometry": BUCKET,
-        "position_w": np.zeros(3),
-        "rotation_w": np.eye(3),
-        "linear_velocity_w": np.zeros(3),
-        "angular_velocity_w": np.zeros(3),
-    }
-    return Tool(**(values | changes))
+    return Tool(geometry=BUCKET, **(POSE | changes))
 
 
 def test_volume_and_centroid_of_a_triangle():
@@ -38,46 +41,38 @@ def test_corners_lie_on_the_planes_and_the_centroid_inside():
 
 
 @pytest.mark.parametrize(
-    ("profile", "message"),
+    ("changes", "message"),
     [
-        (TRIANGLE[:2], r"shape \(2, 2\)"),
-        (TRIANGLE[::-1], "not convex and counter-clockwise"),
-        (np.array([(1.0, 0.0), (0.5, 0.1), (0.4, 0.5), (0.0, 0.0)]), "not convex"),
-        (np.array([(1.0, 0.0), (0.5, 0.5), (0.0, -0.1)]), "z_t < 0"),
-        (np.array([(1.0, 0.0), (0.5, np.nan), (0.0, 0.0)]), "not finite"),
-        (np.array([(1.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 0.0)]), "lists the same point twice"),
-        (np.array([(1.0, 0.0), (0.5, 0.5), (0.0, 0.0), (1.0, 0.0)]), "lists the same point twice"),
-        (np.array([(1.0, 0.0), (0.5, 0.0), (0.0, 0.0)]), "holds no volume"),
+        ({"profile_t": TRIANGLE[:2]}, r"shape \(2, 2\)"),
+        ({"profile_t": TRIANGLE[::-1]}, "not convex and counter-clockwise"),
+        ({"profile_t": [(1.0, 0.0), (0.5, 0.1), (0.4, 0.5), (0.0, 0.0)]}, "not convex"),
+        ({"profile_t": [(1.0, 0.0), (0.5, 0.5), (0.0, -0.1)]}, "z_t < 0"),
+        ({"profile_t": [(1.0, 0.0), (0.5, np.nan), (0.0, 0.0)]}, "not finite"),
+        ({"profile_t": [(1.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 0.0)]}, "lists the same point twice"),
+        ({"profile_t": [(1.0, 0.0), (0.5, 0.5), (0.0, 0.0), (1.0, 0.0)]}, "lists the same point twice"),
+        ({"profile_t": [(1.0, 0.0), (0.5, 0.0), (0.0, 0.0)]}, "holds no volume"),
+        ({"inner_width_m": 0.0}, "inner_width_m=0.0"),
+        ({"inner_width_m": np.nan}, "inner_width_m=nan"),
+        ({"inner_width_m": np.inf}, "inner_width_m=inf"),
+        ({"position_w": np.zeros(2)}, "position_w has shape"),
+        ({"linear_velocity_w": np.array([np.inf, 0, 0])}, r"linear_velocity_w=.* is not finite"),
+        ({"rotation_w": 2 * np.eye(3)}, "off orthonormal"),
+        ({"rotation_w": np.diag([1.0, 1.0, -1.0])}, "is a reflection"),
     ],
 )
-def test_a_bad_profile_is_refused(profile, message):
+def test_a_bad_tool_is_refused(changes, message):
     with pytest.raises(ConfigurationError, match=message):
-        ToolGeometry(profile_t=profile, inner_width_m=1.0)
-
-
-@pytest.mark.parametrize("width", [0.0, np.nan, np.inf])
-def test_a_bad_width_is_refused(width):
-    with pytest.raises(ConfigurationError, match="inner_width_m"):
-        ToolGeometry(profile_t=TRIANGLE, inner_width_m=width)
+        tool(**changes) if changes.keys() <= POSE.keys() else dataclasses.replace(BUCKET, **changes)
 
 
 def test_a_geometry_knows_its_shape_and_no_other():
-    geometry = ToolGeometry(profile_t=TRIANGLE, inner_width_m=1.0)
-    assert geometry.has_shape_of(ToolGeometry(profile_t=TRIANGLE, inner_width_m=1.0))
-    assert not geometry.has_shape_of(ToolGeometry(profile_t=TRIANGLE, inner_width_m=2.0))
-    assert not geometry.has_shape_of(ToolGeometry(profile_t=2 * TRIANGLE, inner_width_m=1.0))
-    assert not geometry.has_shape_of(BUCKET)
-
-
-def test_a_bad_pose_is_refused():
-    with pytest.raises(ConfigurationError, match="position_w has shape"):
-        tool(position_w=np.zeros(2))
-    with pytest.raises(ConfigurationError, match=r"linear_velocity_w=.* is not finite"):
-        tool(linear_velocity_w=np.array([np.inf, 0, 0]))
-    with pytest.raises(ConfigurationError, match="off orthonormal"):
-        tool(rotation_w=2 * np.eye(3))
-    with pytest.raises(ConfigurationError, match="is a reflection"):
-        tool(rotation_w=np.diag([1.0, 1.0, -1.0]))
+    geometry = dataclasses.replace(BUCKET, profile_t=TRIANGLE)
+    assert geometry.has_shape_of(dataclasses.replace(geometry))
+    for other in (
+        BUCKET,
+        *(dataclasses.replace(geometry, **c) for c in ({"inner_width_m": 2.0}, {"profile_t": 2 * TRIANGLE})),
+    ):
+        assert not geometry.has_shape_of(other)
 
 
 @pytest.mark.parametrize("pitch", [-3.0, -1.5, 0.0, 0.4, 3.0])

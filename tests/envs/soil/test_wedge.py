@@ -5,36 +5,23 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.earthmoving import failure_table
 from lerobot_excav.envs.soil.forces import soil_strength
-from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.wedge import EDGE_THICKNESS_M, edge_bearing, edge_limits, table_row, wedge_area
 from validation.soil.reference import wedge as reference
+from validation.soil.reference.worlds import flat
 
 SAND = soil_strength(PRESETS["sand"])
-TABLE = failure_table(PRESETS["sand"].friction_angle_rad, PRESETS["sand"].steel_friction_angle_rad)
 AHEAD = (-1.0, 0.0)
 
 
-def flat(height=1.0):
-    field = HeightField((120, 120), (0.05, 0.05), 0.0)
-    field.reset(np.full((120, 120), height))
-    return field
-
-
 def limits(field, edges, weighed=None, rake_deg=40.0):
-    return edge_limits(
-        field.heights,
-        field.heights if weighed is None else weighed,
-        field.grid,
-        edges,
-        math.radians(rake_deg),
-        AHEAD,
-        0.7,
-        SAND,
-        TABLE,
-    )
+    weighed = field.heights if weighed is None else weighed
+    rake = math.radians(rake_deg)
+    return edge_limits(field.heights, weighed, field.grid, np.array(edges), rake, AHEAD, 0.7, SAND)
+
+
+EDGE = [[0.0, 0.0, 0.7]]
 
 
 @given(failure=st.floats(0.25, 0.6), slope=st.floats(-0.4, 0.2), depth=st.floats(0.05, 0.5))
@@ -51,40 +38,38 @@ def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
 
 def test_rakes_beyond_the_table_count_as_its_ends():
     for inside, outside in ((20.0, -30.0), (90.0, 100.0), (90.0, 170.0)):
-        assert table_row(TABLE, math.radians(outside)) == pytest.approx(table_row(TABLE, math.radians(inside)))
-    edges = np.array([[0.0, 0.0, 0.7]])
-    assert limits(flat(), edges, rake_deg=120.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=90.0)[0])
-    assert limits(flat(), edges, rake_deg=5.0)[0] == pytest.approx(limits(flat(), edges, rake_deg=20.0)[0])
+        assert table_row(SAND.table, math.radians(outside)) == pytest.approx(
+            table_row(SAND.table, math.radians(inside))
+        )
+    for inside, outside in ((90.0, 120.0), (20.0, 5.0)):
+        found = limits(flat(), EDGE, rake_deg=outside)[0]
+        assert found == pytest.approx(limits(flat(), EDGE, rake_deg=inside)[0])
 
 
 def test_each_slice_has_the_soil_before_it():
     field = flat()
     field.heights[:, 60:] += 0.2
-    wedges, bearings = limits(field, np.array([[0.0, -0.5, 0.8], [0.0, 0.5, 0.8]]))
+    wedges, bearings = limits(field, [[0.0, -0.5, 0.8], [0.0, 0.5, 0.8]])
     assert wedges[1] > 3.0 * wedges[0] > 0.0
     assert bearings[1] > bearings[0] > 0.0
 
 
 def test_slices_add_up_to_the_whole_edge():
-    whole = limits(flat(), np.array([[0.0, 0.0, 0.7]]))
-    parts = limits(flat(), np.array([[0.0, y, 0.7] for y in (-0.3, -0.1, 0.1, 0.3)]))
-    assert parts[0].sum() == pytest.approx(whole[0][0])
-    assert parts[1].sum() == pytest.approx(whole[1][0])
+    parts = limits(flat(), [[0.0, y, 0.7] for y in (-0.3, -0.1, 0.1, 0.3)])
+    np.testing.assert_allclose(np.sum(parts, axis=1), np.sum(limits(flat(), EDGE), axis=1))
 
 
 def test_loose_soil_on_the_ground_weighs_on_the_wedge_but_does_not_bury_the_edge():
     field = flat()
     weighed = field.heights + 0.1
-    edges = np.array([[0.0, 0.0, 0.7]])
-    plain, loaded = limits(field, edges), limits(field, edges, weighed)
+    plain, loaded = limits(field, EDGE), limits(field, EDGE, weighed)
     assert loaded[0][0] > 1.3 * plain[0][0]
     assert loaded[1][0] == plain[1][0]
-    above = np.array([[0.0, 0.0, 1.05]])
-    assert not np.any(limits(field, above, weighed))
+    assert not np.any(limits(field, [[0.0, 0.0, 1.05]], weighed))
 
 
 def test_an_edge_outside_of_the_field_meets_nothing():
-    assert not np.any(limits(flat(), np.array([[3.5, 0.0, 0.5], [0.0, -3.2, 0.5]])))
+    assert not np.any(limits(flat(), [[3.5, 0.0, 0.5], [0.0, -3.2, 0.5]]))
 
 
 def test_the_bearing_starts_from_zero_and_grows():

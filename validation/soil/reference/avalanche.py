@@ -4,8 +4,15 @@ import math
 
 import numpy as np
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.relaxation import FLOW_FRACTION, REST_TAN
-from validation import Array
+
+
+def steepest(heights: Array, cell_m: float) -> float:
+    """Return the tangent of the steepest slope between a column and any of its eight neighbours."""
+    straight = max(float(np.abs(np.diff(heights, axis=axis)).max()) for axis in (0, 1))
+    one, other = heights[1:, 1:] - heights[:-1, :-1], heights[1:, :-1] - heights[:-1, 1:]
+    return max(straight, float(np.abs([one, other]).max()) / math.sqrt(2.0)) / cell_m
 
 
 def sweep(

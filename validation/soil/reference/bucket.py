@@ -1,12 +1,11 @@
 """Twin of `cutting`: what is inside of a bucket, and how it got there."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from validation import Array
+from lerobot_excav.envs.soil.arrays import Array, Bools
 
 
-def inside(planes: Array, points_t: Array) -> NDArray[np.bool_]:
+def inside(planes: Array, points_t: Array) -> Bools:
     """Tell which of (n, 3) tool points are inside of all half-spaces."""
     return np.asarray((points_t @ planes[:, :3].T <= planes[:, 3]).all(axis=1))
 

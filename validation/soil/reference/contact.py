@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
     LARGEST_PHASE,
@@ -14,7 +15,6 @@ from lerobot_excav.envs.soil.parcels.contact import (
     TANGENTIAL_STIFFNESS,
     Law,
 )
-from validation import Array
 
 
 def normal_force(overlap: float, separation_speed: float, stiffness: float, mass: float, radius: float) -> float:

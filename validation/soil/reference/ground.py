@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.ground import LEAST_GAP, LIFT, Site
 from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
-from validation import Array
 from validation.soil.reference.contact import wall_contact
 
 

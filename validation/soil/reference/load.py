@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.load import LARGEST_HEAP_M, LEAVING_M_S, LOOKS_UP
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
-from validation import Array
 
 
 def is_load(tool: ToolPath, position: Array, velocity: Array, radius: float) -> bool:

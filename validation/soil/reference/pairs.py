@@ -3,8 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array, Flags
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.pairs import SKIN
 from lerobot_excav.envs.soil.parcels.store import State
@@ -15,7 +15,7 @@ Memory = dict[tuple[int, int], Array]
 """Springs (6,) of each touching pair i < j [m]."""
 
 
-def neighbours(positions: Array, radii: Array, asleep: NDArray[np.uint8]) -> set[tuple[int, int]]:
+def neighbours(positions: Array, radii: Array, asleep: Flags) -> set[tuple[int, int]]:
     """Return all pairs i < j that are nearer than the skin and not both asleep."""
     skin = SKIN * float(radii.max())
     return {

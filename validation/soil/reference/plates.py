@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from validation import Array
+from lerobot_excav.envs.soil.arrays import Array
 
 
 def wedge_area(depths: Array, spacing_m: float, failure: float) -> float:

@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.tool import ToolGeometry
-
-Array = NDArray[np.float64]
 
 _JITTER = 0.25
 """Largest random offset of a new parcel, in radii: no lattice builds up (guess)."""
@@ -42,15 +40,7 @@ class Bins(NamedTuple):
 
 @kernel
 def gather(bins: Bins, x: float, y: float, z: float, volume: float) -> None:
-    """Book a volume in the bin of the opening before which a tool point lies.
-
-    Args:
-        bins: Their volumes are changed in place.
-        x: Of the point [m].
-        y: The same.
-        z: The same.
-        volume: To book [m3].
-    """
+    """Book a volume [m3] in the bin of the opening before which a tool point [m] lies; `bins` changes in place."""
     volumes = bins.volumes
     share = (x - bins.x) * bins.along_x + (z - bins.z) * bins.along_z
     i = min(max(int(share * volumes.shape[0]), 0), volumes.shape[0] - 1)
@@ -60,13 +50,7 @@ def gather(bins: Bins, x: float, y: float, z: float, volume: float) -> None:
 
 @kernel
 def move_inside(points: Array, planes: Array, inset: float) -> None:
-    """Move tool points off the plates and the opening, into the bucket.
-
-    Args:
-        points: (n, 3) [m], changed in place.
-        planes: (m, 4) half-spaces of the inside.
-        inset: Wanted distance from each of them [m].
-    """
+    """Move (n, 3) tool points, in place, inside of (m, 4) half-spaces by a distance `inset` [m]."""
     for i in range(len(points)):
         for _ in range(_PASSES):
             for k in range(len(planes)):
@@ -95,16 +79,9 @@ class Intake:
         self._edge, self._lip = geometry.profile_t[0], geometry.profile_t[-1]
         across = self._lip - self._edge
         length = float(np.linalg.norm(across))
-        shape = (
-            max(1, round(length / (2 * radius_m))),
-            max(1, round(geometry.inner_width_m / (2 * radius_m))),
-        )
+        shape = (max(1, round(length / (2 * radius_m))), max(1, round(geometry.inner_width_m / (2 * radius_m))))
         (x, z), (along_x, along_z) = self._edge.tolist(), (across / length**2).tolist()
         self.bins = Bins(np.zeros(shape), x, z, along_x, along_z, float(geometry.inner_width_m))
-
-    def belongs_to(self, geometry: ToolGeometry) -> bool:
-        """Tell whether this is the intake of a bucket of that shape."""
-        return self.geometry.has_shape_of(geometry)
 
     @property
     def waiting_m3(self) -> float:

@@ -10,12 +10,9 @@ makes in one sub-step, before it can fade.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 SPRINGS = 6
@@ -116,21 +113,13 @@ def spring_force(
         dt: Duration [s].
     """
     along = dot(velocity, normal)
-    v0, v1, v2 = (
-        velocity[0] - along * normal[0],
-        velocity[1] - along * normal[1],
-        velocity[2] - along * normal[2],
-    )
+    v0, v1, v2 = (velocity[0] - along * normal[0], velocity[1] - along * normal[1], velocity[2] - along * normal[2])
     s0, s1, s2 = springs[row, first], springs[row, first + 1], springs[row, first + 2]
     along = s0 * normal[0] + s1 * normal[1] + s2 * normal[2]
     s0 += v0 * dt - along * normal[0]
     s1 += v1 * dt - along * normal[1]
     s2 += v2 * dt - along * normal[2]
-    f0, f1, f2 = (
-        -stiffness * s0 - damping * v0,
-        -stiffness * s1 - damping * v1,
-        -stiffness * s2 - damping * v2,
-    )
+    f0, f1, f2 = (-stiffness * s0 - damping * v0, -stiffness * s1 - damping * v1, -stiffness * s2 - damping * v2)
     square = f0 * f0 + f1 * f1 + f2 * f2
     if square > limit * limit:  # it slides: the spring keeps the stretch that friction can hold
         share = limit / math.sqrt(square)
@@ -205,17 +194,8 @@ def wall_contact(
 ) -> tuple[Vector, Vector]:
     """Return force [N] and torque [N m] on a parcel that touches something that it does not move.
 
-    Args:
-        springs: (n, 6) memories of contacts [m], changed in place.
-        row: Which contact.
-        normal: Unit normal towards the parcel.
-        gap: Distance of the parcel's centre from the wall, below its radius [m].
-        velocity: Of its centre relative to the wall [m/s].
-        spin: Its angular velocity [rad/s].
-        mass: Its mass [kg].
-        radius: Its radius [m].
-        law: Coefficients.
-        dt: Duration [s].
+    Its centre has a distance `gap` [m] below its radius, a velocity relative to the wall [m/s] and a spin [rad/s]; the
+    other arguments are as in `contact`.
     """
     arm = (-gap * normal[0], -gap * normal[1], -gap * normal[2])
     turning = cross(spin, arm)

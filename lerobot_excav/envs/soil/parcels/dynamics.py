@@ -4,17 +4,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.soil.arrays import Indices
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State
-
-Array = NDArray[np.float64]
 
 LARGEST_SPEED_M_S = 12.0
 """Speed limit of a parcel: a fall from 7 m. Above, it could pass through a plate."""
@@ -33,13 +31,7 @@ class Laws(NamedTuple):
 
 @kernel
 def carry(state: State, tool: ToolPath, step: int) -> None:
-    """Move the sleeping parcels with the bucket.
-
-    Args:
-        state: All parcels, changed in place.
-        tool: The bucket.
-        step: Which of its poses.
-    """
+    """Move the sleeping parcels of a state, in place, to where they lie in the bucket at its pose number `step`."""
     position, rotation = tool.positions[step], tool.rotations[step]
     w = (tool.angular[0], tool.angular[1], tool.angular[2])
     for i in range(len(state.masses)):
@@ -59,13 +51,7 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
 
 @kernel
 def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
-    """Add the forces of touching parcels on each other.
-
-    Args:
-        state: All parcels, changed in place.
-        pairs: Those that may touch; the memory of their contacts is changed.
-        law: Coefficients.
-        dt: Duration [s].
+    """Add the forces of touching parcels on each other; change the memory of their contacts.
 
     Returns:
         Fastest closing speed between a sleeping parcel and one that is awake [m/s].
@@ -143,7 +129,7 @@ def advance(
     state: State,
     pairs: Pairs,
     spare: Pairs,
-    old_rows: NDArray[np.int64],
+    old_rows: Indices,
     tool: ToolPath,
     site: Site,
     laws: Laws,

@@ -3,22 +3,12 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
 from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls, to_box
-from lerobot_excav.envs.soil.parcels.store import (
-    SHELTERED,
-    TOUCHES_BOX_FLOOR,
-    TOUCHES_GROUND,
-    TOUCHES_OUTSIDE,
-    State,
-)
-
-Array = NDArray[np.float64]
+from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 
 LEAST_GAP = 0.3
 """Share of its radius to which a parcel's centre may come near to the ground: ground that rises below it when others
@@ -85,14 +75,7 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
     """Add the forces of the ground on the awake parcels and note what each touches.
 
     Deep inside the bucket there is no ground: the height field, one height per column, would leak in through the
-    shell.
-
-    Args:
-        state: All parcels, changed in place.
-        site: The ground.
-        highest: No ground is higher [m].
-        law: Coefficients of the contact with the ground.
-        dt: Duration [s].
+    shell. No ground is higher than `highest` [m].
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
     springs, on_ground, near_plate = state.ground_springs, state.on_ground, state.near_plate

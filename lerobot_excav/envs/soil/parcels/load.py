@@ -3,17 +3,15 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
 from lerobot_excav.envs.soil.parcels.contact import cross
 from lerobot_excav.envs.soil.parcels.dynamics import WAKING_SPEED_M_S
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, inside_depth
 from lerobot_excav.envs.soil.parcels.store import TOUCHES_NOTHING, State
-
-Array = NDArray[np.float64]
 
 LARGEST_HEAP_M = 0.35
 """Parcels up to this far above an opening that looks up belong to the load (guess: half the opening, 45 degrees)."""
@@ -46,11 +44,7 @@ _ACCELERATION_TIME_S = 0.1
 
 @kernel
 def find_load(state: State, tool: ToolPath) -> tuple[float, float, float, int]:
-    """Mark the parcels that lie in the bucket or in the heap above its opening and its rim.
-
-    Args:
-        state: All parcels; `load` is changed.
-        tool: The bucket; its last pose counts.
+    """Mark the parcels, in `state.load`, that lie in the bucket's last pose or in the heap above its opening and rim.
 
     Returns:
         Mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; share of it that
@@ -117,14 +111,9 @@ class Rest:
         self._weight_t: Array = np.zeros(3)
 
     def update(self, state: State, tool: ToolPath, dt_s: float, hit_m_s: float, *, cutting: bool) -> None:
-        """Look at the load after a step.
+        """Look at the load after a step, with the fastest hit on a sleeping parcel; cutting: soil entered the bucket.
 
-        Args:
-            state: All parcels; `load`, `asleep` and `places_t` are changed.
-            tool: The bucket in that step.
-            dt_s: Duration of the step.
-            hit_m_s: Fastest hit on a sleeping parcel.
-            cutting: Whether soil entered the bucket.
+        Changes `load`, `asleep` and `places_t` of the state.
         """
         weight_t = self._direction_of_weight(tool, dt_s)
         woken = False

@@ -4,13 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array, Flags, Indices
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import SPRINGS
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 SKIN = 0.4
 """Gap, in radii of the largest parcel, up to which two parcels count as neighbours (tuned for speed)."""
@@ -38,7 +35,7 @@ class Pairs(NamedTuple):
 
     start: Indices
     partner: Indices
-    closed: NDArray[np.uint8]
+    closed: Flags
     springs: Array
     anchors: Array
     first: Indices
@@ -110,13 +107,7 @@ def _more_room(pairs: Pairs) -> Pairs:
 
 @kernel
 def _find_near(
-    positions: Array,
-    radii: Array,
-    asleep: NDArray[np.uint8],
-    first: Indices,
-    second: Indices,
-    last: Indices,
-    before: Indices,
+    positions: Array, radii: Array, asleep: Flags, first: Indices, second: Indices, last: Indices, before: Indices
 ) -> int:
     """Write all pairs within the skin, first < second, in no order; return their number, which may exceed the room."""
     skin = SKIN * radii.max()
@@ -158,9 +149,7 @@ def _sort_rows(
 
 
 @kernel
-def find_pairs(
-    positions: Array, radii: Array, asleep: NDArray[np.uint8], old: Pairs, old_rows: Indices, new: Pairs
-) -> Pairs:
+def find_pairs(positions: Array, radii: Array, asleep: Flags, old: Pairs, old_rows: Indices, new: Pairs) -> Pairs:
     """List the neighbours anew; two parcels that both sleep are none.
 
     Args:

@@ -3,15 +3,11 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
 from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, dot, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
-
-Array = NDArray[np.float64]
 
 CLOSEST = 0.25
 """Share of its radius to which a parcel's centre may come near to a plate; there it is put back."""
@@ -128,40 +124,19 @@ def nearest_on_plate(profile: Array, planes: Array, half_width: float, plate: in
 
 @kernel
 def keep_out(
-    positions: Array,
-    velocities: Array,
-    i: int,
-    normal: Vector,
-    gap: float,
-    radius: float,
-    velocity: Vector,
-    dt: float,
+    positions: Array, velocities: Array, i: int, normal: Vector, gap: float, radius: float, velocity: Vector, dt: float
 ) -> Vector:
-    """Put a parcel that came too near to a plate back, and take the speed with which it would pass through.
+    """Put parcel i that came too near to a plate back, and take the speed with which it would pass through.
 
-    Args:
-        positions: (n, 3) of all parcels [m], changed in place.
-        velocities: (n, 3) of all parcels [m/s], changed in place.
-        i: Which parcel.
-        normal: Unit normal towards it.
-        gap: Distance of its centre from the plate [m].
-        radius: Its radius [m].
-        velocity: Of its centre relative to the plate [m/s].
-        dt: Duration [s].
-
-    Returns:
-        The relative velocity that is left [m/s].
+    Positions and velocities of all parcels are (n, 3) and change in place; the other arguments are as in
+    `contact.wall_contact`. Returns the relative velocity that is left [m/s].
     """
     back = max(0.0, CLOSEST * radius - gap)
     excess = max(0.0, -dot(velocity, normal) - LARGEST_APPROACH * (gap + back) / dt)
     for a in range(3):
         positions[i, a] += back * normal[a]
         velocities[i, a] += excess * normal[a]
-    return (
-        velocity[0] + excess * normal[0],
-        velocity[1] + excess * normal[1],
-        velocity[2] + excess * normal[2],
-    )
+    return (velocity[0] + excess * normal[0], velocity[1] + excess * normal[1], velocity[2] + excess * normal[2])
 
 
 @kernel
@@ -184,13 +159,8 @@ def _wall_velocity(rotation: Array, linear: Array, angular: Array, c: Vector) ->
 def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
     """Add the forces of the bucket's plates on the awake parcels, and note where each is at the bucket.
 
-    Args:
-        state: All parcels, changed in place.
-        step: Which sub-step.
-        tool: The bucket.
-        opening_margin: A parcel this far behind the opening is sheltered: there is no ground for it [m].
-        law: Coefficients of the contact with steel.
-        dt: Duration [s].
+    `step` is the number of the sub-step. A parcel `opening_margin` [m] behind the opening is sheltered: there is no
+    ground for it.
     """
     position, rotation = tool.positions[step], tool.rotations[step]
     # Plain arrays: taking one out of a named tuple costs more than the contact.
@@ -251,15 +221,7 @@ def to_box(box: BoxWalls, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> None:
-    """Add the forces of the four walls of the target box on the awake parcels.
-
-    Args:
-        state: All parcels, changed in place.
-        first: Index of the first wall among the plates.
-        box: The container.
-        law: Coefficients of the contact with steel.
-        dt: Duration [s].
-    """
+    """Add the forces of the four walls of the target box, plates from number `first` on, on the awake parcels."""
     positions, velocities, spins = state.positions, state.velocities, state.spins
     plates = state.plate_springs.shape[1]
     springs = state.plate_springs.reshape((-1, SPRINGS))

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lerobot_excav.envs.soil.arrays import Array, Bools, Flags, Indices
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
 from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
@@ -23,8 +23,6 @@ from lerobot_excav.envs.soil.parcels.store import (
     keep,
     rows,
 )
-
-Array = NDArray[np.float64]
 
 SETTLING_SPEED_M_S = 0.4
 """A parcel on the ground slower than this merges with it (soil.md: 0.3 to 0.5 m/s)."""
@@ -50,15 +48,15 @@ class Landed:
 
     points_w: Array
     masses_kg: Array
-    place: NDArray[np.uint8]
+    place: Flags
 
     @property
-    def is_on_ground(self) -> NDArray[np.bool_]:
+    def is_on_ground(self) -> Bools:
         """Tell which lay in the dig area."""
         return np.asarray(self.place == TOUCHES_GROUND)
 
     @property
-    def is_in_box(self) -> NDArray[np.bool_]:
+    def is_in_box(self) -> Bools:
         """Tell which lay in the target box."""
         return np.asarray(self.place == TOUCHES_BOX_FLOOR)
 
@@ -92,7 +90,7 @@ class Population:
     def clear(self) -> None:
         """Remove all parcels."""
         self.state = rows(self._all, 0)
-        self._rows: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._rows: Indices = np.zeros(0, dtype=np.int64)
         self._rest.clear()
 
     def __setstate__(self, attributes: dict[str, Any]) -> None:
@@ -116,14 +114,9 @@ class Population:
         return int(len(self.state.asleep) - self.state.asleep.sum())
 
     def add(self, positions: Array, velocities: Array, masses_kg: Array) -> None:
-        """Add parcels; their radius follows from their mass.
+        """Add parcels at (n, 3) centres [m], z above the rigid floor, with (n, 3) velocities [m/s] and (n,) masses.
 
-        Above the bound on awake parcels, mass and momentum join the nearest awake parcel.
-
-        Args:
-            positions: (n, 3) centres [m], z above the rigid floor.
-            velocities: (n, 3) [m/s].
-            masses_kg: (n,) masses.
+        Their radius follows from their mass. Above the bound on awake parcels, mass and momentum join the nearest one.
         """
         free = max(0, self._most_awake - self.awake_count)
         count = min(free, len(positions))
@@ -159,14 +152,7 @@ class Population:
         state.masses[i] += mass_kg
 
     def step(self, tool: ToolPath, site: Site, dt_s: float, *, cutting: bool) -> None:
-        """Move all parcels and find the load of the bucket.
-
-        Args:
-            tool: The bucket on its way.
-            site: The ground.
-            dt_s: Duration.
-            cutting: Whether soil entered the bucket.
-        """
+        """Move all parcels and find the load of the bucket; cutting: soil entered it."""
         if len(self.state.masses) == 0:
             return
         steps, hit = len(tool.positions) - 1, 0.0
@@ -193,11 +179,7 @@ class Population:
 
         Outside of dig area and box they go as soon as they touch, and so does what is caught between the
         outside of the bucket and the ground: a parcel there would push the bucket up. One that has rested elsewhere
-        for long, say on the rim of the box, drops to what is below it.
-
-        Args:
-            site: The ground.
-            dt_s: Duration of the step before.
+        for long, say on the rim of the box, drops to what is below it. `dt_s` is the duration of the step before.
         """
         state = self.state
         loose = (state.load == 0) & (state.asleep == 0)
@@ -209,12 +191,8 @@ class Population:
         caught = (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
         at_rest = state.calm_s >= SETTLING_TIME_S
         gone = grounded & (caught | at_rest | (state.ground == TOUCHES_OUTSIDE))
-        landed = Landed(
-            points_w=state.positions[gone, :2],
-            masses_kg=state.masses[gone],
-            place=state.ground[gone],
-        )
+        landed = Landed(points_w=state.positions[gone, :2], masses_kg=state.masses[gone], place=state.ground[gone])
         if len(landed.masses_kg):
-            self.state = rows(self._all, keep(state, (~gone).astype(np.uint8)))
+            self.state = rows(self._all, keep(state, ~gone))
             self._rows = self._rows[~gone]
         return landed

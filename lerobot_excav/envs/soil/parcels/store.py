@@ -5,10 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.soil.compiled import kernel
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.uint8]
+from lerobot_excav.envs.soil.arrays import Array, Bools, Flags
 
 WALLS = 4
 """Plates of the target box."""
@@ -98,28 +95,9 @@ def copy_rows(source: State, target: State) -> None:
         new[: len(old)] = old
 
 
-@kernel
-def keep(state: State, kept: Flags) -> int:
+def keep(state: State, kept: Bools) -> int:
     """Move the kept rows to the front, in their order; return their number."""
-    count = 0
-    for i in range(len(kept)):
-        if not kept[i]:
-            continue
-        if count < i:
-            state.positions[count] = state.positions[i]
-            state.velocities[count] = state.velocities[i]
-            state.spins[count] = state.spins[i]
-            state.masses[count] = state.masses[i]
-            state.radii[count] = state.radii[i]
-            state.places_t[count] = state.places_t[i]
-            state.calm_s[count] = state.calm_s[i]
-            state.asleep[count] = state.asleep[i]
-            state.load[count] = state.load[i]
-            state.ground[count] = state.ground[i]
-            state.on_ground[count] = state.on_ground[i]
-            state.shell[count] = state.shell[i]
-            state.near_plate[count] = state.near_plate[i]
-            state.ground_springs[count] = state.ground_springs[i]
-            state.plate_springs[count] = state.plate_springs[i]
-        count += 1
+    count = int(kept.sum())
+    for array in state:
+        array[:count] = array[kept]
     return count

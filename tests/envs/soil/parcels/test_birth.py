@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from bench.soil import BUCKET
 from lerobot_excav.envs.soil.parcels.birth import Intake, gather
+from validation.soil.reference.worlds import RADIUS
 
-RADIUS = 0.045
 PARCEL_M3 = 6.4e-4
 EDGE, LIP = BUCKET.profile_t[0], BUCKET.profile_t[-1]
 HALF = 0.5 * BUCKET.inner_width_m
@@ -20,16 +20,22 @@ def bin_of(intake, point_t):
     return int(np.clip(share, 0.0, 0.999999) * rows), int(np.clip(across, 0.0, 0.999999) * columns)
 
 
+def filled(entries):
+    intake = Intake(BUCKET, RADIUS)
+    for point, volume in entries:
+        gather(intake.bins, *point, volume)
+    return intake
+
+
 points = st.tuples(st.floats(-0.2, 1.4), st.floats(-0.6, 0.6), st.floats(-0.2, 0.6))
 
 
 @given(entries=st.lists(st.tuples(points, st.floats(0.0, 1e-3)), min_size=1, max_size=20))
 @settings(max_examples=60)
 def test_what_enters_waits_in_the_bin_before_which_it_lay(entries):
-    intake = Intake(BUCKET, RADIUS)
+    intake = filled(entries)
     expected = np.zeros_like(intake.bins.volumes)
     for point, volume in entries:
-        gather(intake.bins, *point, volume)
         expected[bin_of(intake, np.array(point))] += volume
     np.testing.assert_allclose(intake.bins.volumes, expected, atol=1e-15)
     assert intake.waiting_m3 == pytest.approx(sum(volume for _, volume in entries), abs=1e-15)
@@ -42,15 +48,10 @@ def test_bins_are_about_as_wide_as_a_parcel():
     assert Intake(BUCKET, 10.0).bins.volumes.shape == (1, 1)
 
 
-@given(
-    entries=st.lists(st.tuples(points, st.floats(0.0, 3e-3)), min_size=1, max_size=30),
-    seed=st.integers(0, 99),
-)
+@given(entries=st.lists(st.tuples(points, st.floats(0.0, 3e-3)), min_size=1, max_size=30), seed=st.integers(0, 99))
 @settings(max_examples=60)
 def test_whole_parcels_leave_and_less_than_one_waits(entries, seed):
-    intake = Intake(BUCKET, RADIUS)
-    for point, volume in entries:
-        gather(intake.bins, *point, volume)
+    intake = filled(entries)
     total = intake.waiting_m3
     born = intake.births(PARCEL_M3, np.random.default_rng(seed))
     assert born.shape == (int(total / PARCEL_M3), 3)
@@ -61,8 +62,7 @@ def test_whole_parcels_leave_and_less_than_one_waits(entries, seed):
 @given(point=points, seed=st.integers(0, 99))
 @settings(max_examples=60)
 def test_a_parcel_is_born_inside_the_bucket_near_to_where_its_soil_entered(point, seed):
-    intake = Intake(BUCKET, RADIUS)
-    gather(intake.bins, *point, 1.5 * PARCEL_M3)
+    intake = filled([(point, 1.5 * PARCEL_M3)])
     row, column = bin_of(intake, np.array(point))
     born = intake.births(PARCEL_M3, np.random.default_rng(seed))[0]
     beyond = BUCKET.planes_t[:, :3] @ born - BUCKET.planes_t[:, 3]

@@ -1,3 +1,5 @@
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,11 +7,8 @@ from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.parcels.dynamics import press_pairs
 from lerobot_excav.envs.soil.parcels.pairs import SKIN, enlarged, find_pairs, is_outdated, room_for
-from lerobot_excav.envs.soil.parcels.store import State
 from validation.soil.reference import pairs as reference
-
-RADIUS = 0.045
-DT = 0.001
+from validation.soil.reference.worlds import DT, LAWS, RADIUS, make_state, random_state
 
 
 def listed(pairs, count):
@@ -24,7 +23,7 @@ def first_list(state, room=None):
 
 @given(seed=st.integers(0, 2**16), count=st.integers(1, 40), size=st.sampled_from([0.1, 0.3, 1.0, 4.0]))
 @settings(max_examples=60)
-def test_all_neighbours_are_listed_once_and_no_others(random_state, seed, count, size):
+def test_all_neighbours_are_listed_once_and_no_others(seed, count, size):
     rng = np.random.default_rng(seed)
     state = random_state(rng, count, size, centre=rng.uniform(-30.0, 30.0, 3))
     state.asleep[:] = rng.random(count) < 0.4
@@ -33,14 +32,14 @@ def test_all_neighbours_are_listed_once_and_no_others(random_state, seed, count,
     assert set(found) == reference.neighbours(state.positions, state.radii, state.asleep)
 
 
-def test_parcels_whose_cells_have_the_same_number_are_no_neighbours(make_state):
+def test_parcels_whose_cells_have_the_same_number_are_no_neighbours():
     cell = (2.0 + SKIN) * RADIUS
     far = cell * np.array([[32.0, 0.0, 0.0], [0.0, 32.0, 0.0], [0.0, 0.0, 16.0], [-64.0, 32.0, 16.0]])
     state = make_state(np.concatenate([np.zeros((1, 3)), far]))
     assert listed(first_list(state), 5) == []
 
 
-def test_a_crowd_gets_the_room_that_it_needs(make_state):
+def test_a_crowd_gets_the_room_that_it_needs():
     """200 parcels at one point are 19,900 pairs, where there is room for 16 per parcel."""
     state = make_state(np.zeros((200, 3)))
     pairs = first_list(state)
@@ -50,13 +49,13 @@ def test_a_crowd_gets_the_room_that_it_needs(make_state):
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=60)
-def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state, laws, seed):
+def test_pair_forces_are_those_of_every_parcel_against_every_other(seed):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 12, 0.12)
     state.asleep[:] = rng.random(12) < 0.3
-    twin, memory = State(*(array.copy() for array in state)), {}
+    twin, memory = deepcopy(state), {}
     pairs = first_list(state)
-    law = laws.parcel._replace(cohesion=float(rng.choice([0.0, 2100.0])))
+    law = LAWS.parcel._replace(cohesion=float(rng.choice([0.0, 2100.0])))
     for _ in range(4):  # contacts open and close while the parcels are shaken
         shaken = rng.normal(0.0, 0.1 * SKIN * RADIUS, (12, 3))
         for s in (state, twin):
@@ -77,37 +76,34 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(random_state,
 
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=60)
-def test_forces_between_parcels_keep_linear_and_angular_momentum(random_state, laws, seed):
+def test_forces_between_parcels_keep_linear_and_angular_momentum(seed):
     state = random_state(np.random.default_rng(seed), 12, 0.1)
-    press_pairs(state, first_list(state), laws.parcel, DT)
+    press_pairs(state, first_list(state), LAWS.parcel, DT)
     moments = np.cross(state.positions, state.forces) + state.torques
     assert np.abs(state.forces).max() > 1.0
     np.testing.assert_allclose(state.forces.sum(axis=0), 0.0, atol=1e-9)
     np.testing.assert_allclose(moments.sum(axis=0), 0.0, atol=1e-9)
 
 
-def remembered(state, rng):
-    """Return a list whose contacts are all closed, each with a memory of its own, and those memories."""
-    pairs = first_list(state)
-    names = listed(pairs, len(state.masses))
-    pairs.closed[: len(names)] = 1
-    pairs.springs[: len(names)] = rng.normal(0.0, 1.0, (len(names), 6))
-    return pairs, {name: pairs.springs[k].copy() for k, name in enumerate(names)}
-
-
-@given(seed=st.integers(0, 2**16))
-@settings(max_examples=40)
-def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(random_state, make_state, seed):
+@given(seed=st.integers(0, 2**16), capacity=st.sampled_from([23, 200]))
+@settings(max_examples=60)
+def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(seed, capacity):
+    """Also one with more room."""
     rng = np.random.default_rng(seed)
     state = random_state(rng, 20, 0.15)
-    pairs, memory = remembered(state, rng)
+    pairs = first_list(state)
+    names = listed(pairs, 20)
+    pairs.closed[: len(names)] = 1
+    pairs.springs[: len(names)] = rng.normal(0.0, 1.0, (len(names), 6))
+    memory = {name: pairs.springs[k].copy() for k, name in enumerate(names)}
     stayed = np.flatnonzero(rng.random(20) < 0.7)
     old_rows = np.concatenate([stayed, [-1, -1, -1]]).astype(np.int64)
     changed = make_state(np.concatenate([state.positions[stayed], rng.uniform(-0.15, 0.15, (3, 3))]))
     changed.radii[: len(stayed)] = state.radii[stayed]
     changed.radii[len(stayed) :] = state.radii.max()
     count = len(old_rows)
-    new = find_pairs(changed.positions, changed.radii, changed.asleep, pairs, old_rows, room_for(count))
+    room = enlarged(pairs, capacity), old_rows, room_for(capacity)
+    new = find_pairs(changed.positions, changed.radii, changed.asleep, *room)
     for k, (i, j) in enumerate(listed(new, count)):
         old = memory.get((int(old_rows[i]), int(old_rows[j])))
         if i < len(stayed) and j < len(stayed) and old is not None:
@@ -118,22 +114,9 @@ def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(random_stat
             assert not new.springs[k].any()
 
 
-def test_memory_survives_when_more_parcels_come_than_there_was_room_for(random_state, make_state, rng):
-    """Also of the last rows, after earlier ones have left."""
-    state = random_state(rng, 30, 0.1)
-    pairs, memory = remembered(state, rng)
-    stayed = np.arange(10, 30)
-    larger = enlarged(pairs, 200)
-    new = find_pairs(state.positions[stayed], state.radii[stayed], state.asleep[stayed], larger, stayed, room_for(200))
-    names = listed(new, 20)
-    assert len(names) > 20
-    for k, (i, j) in enumerate(names):
-        np.testing.assert_array_equal(new.springs[k], memory[int(stayed[i]), int(stayed[j])])
-
-
 @given(seed=st.integers(0, 2**16), step=st.floats(0.0, 0.5), wind=st.floats(-10.0, 10.0))
 @settings(max_examples=80)
-def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(random_state, seed, step, wind):
+def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(seed, step, wind):
     rng = np.random.default_rng(seed)
     state = random_state(rng, 25, 0.25)
     pairs = first_list(state)
@@ -146,7 +129,7 @@ def test_no_unlisted_parcels_touch_as_long_as_the_list_is_not_outdated(random_st
         assert i >= j or (i, j) in known
 
 
-def test_a_list_stays_valid_while_all_parcels_move_together(make_state):
+def test_a_list_stays_valid_while_all_parcels_move_together():
     state = make_state([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     pairs = first_list(state)
     state.positions[:] += 5.0

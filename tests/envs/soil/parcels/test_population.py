@@ -20,12 +20,10 @@ from lerobot_excav.envs.soil.parcels.store import (
     TOUCHES_GROUND,
     TOUCHES_NOTHING,
     TOUCHES_OUTSIDE,
-    State,
 )
 from validation.soil.reference import motion as reference
+from validation.soil.reference.worlds import LAWS, MASS, RADIUS, make_population, no_tool, site, tool_path
 
-RADIUS = 0.045
-MASS = 0.94
 STEPS = 20
 
 NO_GROUND = Site(np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)), Grid(0.0, 0.0, 1.0, 1.0), NO_BOX, 0.0)
@@ -37,13 +35,9 @@ def add(population, positions, velocities=None, masses=None):
     population.add(points, moving, np.full(len(points), MASS) if masses is None else np.asarray(masses))
 
 
-def copy(state):
-    return State(*(array.copy() for array in state))
-
-
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=30)
-def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(laws, make_population, seed):
+def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_mass(seed):
     rng = np.random.default_rng(seed)
     positions, velocities = rng.uniform(-1.0, 1.0, (30, 3)), rng.normal(0.0, 1.0, (30, 3))
     masses = rng.uniform(0.1, 2.0, 30)
@@ -58,7 +52,7 @@ def test_beyond_the_bound_parcels_join_others_with_mass_momentum_and_centre_of_m
     np.testing.assert_allclose(state.radii, RADIUS * np.cbrt(state.masses / MASS))
 
 
-def test_a_parcel_too_many_joins_the_nearest_one_that_is_awake(make_population):
+def test_a_parcel_too_many_joins_the_nearest_one_that_is_awake():
     population = make_population(most_awake=3)
     add(population, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     population.state.asleep[2] = 1
@@ -78,32 +72,31 @@ def fallen(population, tool, site, ticks, rng):
     return landed
 
 
-def test_growing_beyond_the_first_room_changes_nothing(monkeypatch, make_population, no_tool, site):
+def bits(population, landed):
+    parts = [array for one in landed for array in (one.points_w, one.masses_kg)]
+    return [array.tobytes() for array in (*population.state, *parts)]
+
+
+def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch):
     runs = []
     for capacity in (3, 17, 1024):
         monkeypatch.setattr(module, "_FIRST_CAPACITY", capacity)
         population = make_population()
-        landed = fallen(population, no_tool(STEPS), site(), 40, np.random.default_rng(0))
-        runs.append(
-            [array.tobytes() for array in population.state]
-            + [part.points_w.tobytes() + part.masses_kg.tobytes() for part in landed]
-        )
-        assert len(population.state.masses) > 17
-        assert sum(len(part.masses_kg) for part in landed) > 10
-    assert runs[0] == runs[1] == runs[2]
+        for _ in range(2):
+            landed = fallen(population, no_tool(STEPS), site(), 40, np.random.default_rng(0))
+            runs.append(bits(population, landed))
+            assert len(population.state.masses) > 17
+            assert sum(len(part.masses_kg) for part in landed) > 10
+            population.clear()
+            assert len(population.state.masses) == population.awake_count == 0
+    assert all(run == runs[0] for run in runs)
 
 
-def without(memory, gone):
-    """Return the memory of pairs with the rows that stay after some have left."""
-    rows = np.cumsum(~gone) - 1
-    return {(int(rows[i]), int(rows[j])): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
-
-
-def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_population, no_tool, site, laws):
+def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
     """Sticky lumps beyond the border: what touches the ground there leaves at once, new parcels join above."""
-    sticky = laws._replace(parcel=laws.parcel._replace(cohesion=1e4))
+    sticky = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=1e4))
     population, memory = make_population(laws=sticky), {}
-    lump = 1.97 * RADIUS * np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    lump = 1.97 * RADIUS * np.array(list(np.ndindex(2, 2, 2)))
     place, rng = np.array([4.0, 0.0, 0.12]), np.random.default_rng(1)
     left = joined = 0
     for tick in range(16):
@@ -111,33 +104,19 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone(make_popu
             start = lump + place + [0.0, 0.0, 0.05 * tick]
             add(population, start, rng.normal(0.0, 0.05, (8, 3)))
             joined += tick > 0
-        twin = copy(population.state)
+        twin = deepcopy(population.state)
         population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
         reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS)
         np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
-        touching = population.state.ground == TOUCHES_OUTSIDE
-        gone = touching & (population.state.load == 0)
+        gone = (population.state.ground == TOUCHES_OUTSIDE) & (population.state.load == 0)
         left += len(population.settle(NO_GROUND, TICK_S).masses_kg)
-        memory = without(memory, gone)
+        rows = np.cumsum(~gone) - 1
+        pairs = {(i, j): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
+        memory = {(int(rows[i]), int(rows[j])): springs for (i, j), springs in pairs.items()}
     assert left >= 8
     assert joined == 2
     assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) > 10
-
-
-def lying(population, **arrays):
-    """Add one parcel and set what a step would have found out about it."""
-    add(population, [[0.1, 0.2, RADIUS]])
-    for name, value in arrays.items():
-        getattr(population.state, name)[-1] = value
-    return population.state
-
-
-def ticks_until_landed(population):
-    for tick in range(1, 20):
-        if len(population.settle(NO_GROUND, TICK_S).masses_kg):
-            return tick
-    return None
 
 
 WHILE = math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
@@ -158,34 +137,29 @@ SLOW, FAST = [0.9 * SETTLING_SPEED_M_S, 0.0, 0.0], [1.1 * SETTLING_SPEED_M_S, 0.
         ({"ground": TOUCHES_GROUND, "shell": OUTSIDE_OF_SHELL, "velocities": FAST}, 1),  # under the bucket
     ],
 )
-def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(make_population, arrays, ticks):
+def test_a_parcel_becomes_ground_after_a_while_at_rest_or_at_once_or_never(arrays, ticks):
     population = make_population()
-    lying(population, **arrays)
-    assert ticks_until_landed(population) == ticks
+    add(population, [[0.1, 0.2, RADIUS]])
+    for name, value in arrays.items():  # what a step would have found out about it
+        getattr(population.state, name)[-1] = value
+    landed = [len(population.settle(NO_GROUND, TICK_S).masses_kg) for _ in range(20)]
+    assert landed == [int(tick == ticks) for tick in range(1, 21)]
     assert len(population.state.masses) == (ticks is None)
 
 
-def test_the_rest_must_not_be_interrupted(make_population):
+def test_the_rest_must_not_be_interrupted():
     population = make_population()
-    state = lying(population, ground=TOUCHES_GROUND)
-    for _ in range(3):
-        for _ in range(4):
-            assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
-        state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S
-        population.settle(NO_GROUND, TICK_S)
-        state.velocities[0, 0] = 0.0
+    add(population, [[0.1, 0.2, RADIUS]])
+    population.state.ground[0] = TOUCHES_GROUND
+    for tick in range(15):
+        population.state.velocities[0, 0] = 2.0 * SETTLING_SPEED_M_S if tick % WHILE == WHILE - 1 else 0.0
+        assert len(population.settle(NO_GROUND, TICK_S).masses_kg) == 0
 
 
-def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population):
+def test_what_landed_says_where_and_how_much_and_the_others_stay():
     population = make_population()
     add(population, np.arange(15.0).reshape(5, 3), masses=MASS * np.arange(1.0, 6.0))
-    population.state.ground[:] = [
-        TOUCHES_OUTSIDE,
-        TOUCHES_NOTHING,
-        TOUCHES_BOX_FLOOR,
-        TOUCHES_GROUND,
-        TOUCHES_NOTHING,
-    ]
+    population.state.ground[:] = [TOUCHES_OUTSIDE, TOUCHES_NOTHING, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_NOTHING]
     population.state.calm_s[:] = SETTLING_TIME_S
     landed = population.settle(NO_GROUND, TICK_S)
     np.testing.assert_array_equal(landed.points_w, [[0.0, 1.0], [6.0, 7.0], [9.0, 10.0]])
@@ -195,7 +169,7 @@ def test_what_landed_says_where_and_how_much_and_the_others_stay(make_population
     np.testing.assert_allclose(population.state.masses, MASS * np.array([2.0, 5.0]))
 
 
-def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up(make_population, tool_path, site):
+def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothing_up():
     """The back of a carried bucket is let down on a parcel that lies on the ground."""
     population = make_population()
     depth = float(BUCKET.profile_t[:, 1].max())
@@ -212,7 +186,7 @@ def test_a_parcel_under_a_bucket_that_comes_down_becomes_ground_and_holds_nothin
     assert population.state.masses.sum() == 0.0
 
 
-def test_another_number_of_plates_clears_their_memory_and_nothing_else(make_population):
+def test_another_number_of_plates_clears_their_memory_and_nothing_else():
     population = make_population()
     add(population, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
     population.state.plate_springs[:] = 1.0
@@ -225,18 +199,8 @@ def test_another_number_of_plates_clears_their_memory_and_nothing_else(make_popu
     np.testing.assert_array_equal(population.state.positions[:, 2], [1.0, 2.0])
 
 
-def test_nothing_is_left_after_clearing_and_a_new_start_repeats_the_first(make_population, no_tool, site):
-    population, runs = make_population(), []
-    for _ in range(2):
-        fallen(population, no_tool(STEPS), site(), 20, np.random.default_rng(0))
-        runs.append([array.tobytes() for array in population.state])
-        population.clear()
-        assert len(population.state.masses) == population.awake_count == 0
-    assert runs[0] == runs[1]
-
-
 @pytest.mark.parametrize("copied", [deepcopy, lambda population: pickle.loads(pickle.dumps(population))])
-def test_a_copy_goes_on_like_its_original(copied, make_population, no_tool, site):
+def test_a_copy_goes_on_like_its_original(copied):
     original = make_population()
     fallen(original, no_tool(STEPS), site(), 12, np.random.default_rng(0))
     other = copied(original)
