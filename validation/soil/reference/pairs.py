@@ -8,7 +8,6 @@ from lerobot_excav.envs.soil.arrays import Array, Flags
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.pairs import SKIN
 from lerobot_excav.envs.soil.parcels.store import State
-from validation import Array
 from validation.soil.reference.contact import contact
 
 Memory = dict[tuple[int, int], Array]

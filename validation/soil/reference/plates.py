@@ -6,7 +6,6 @@ from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.plates import CLOSEST, LARGEST_APPROACH, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
-from validation import Array
 from validation.soil.reference.contact import wall_contact
 
 _DEEP_M = 100.0
