@@ -28,7 +28,7 @@ COMMANDS = {
     "replay": ([*ROBOT, "--dataset.repo_id=a/b", "--dataset.episode=0"], BAD_FPS),
     "teleoperate": (
         ["--robot.type=excavator_sim", "--teleop.type=excavator_joystick", "--teleop.pattern=crane"],
-        "teleop.pattern='crane' is not known",
+        "teleop.pattern='crane' is not possible",
     ),
     "train": (["--dataset.repo_id=a/b", "--policy.type=mask_act", *ENV], BAD_FPS),
     "eval": (["--policy.type=mask_act", *ENV], BAD_FPS),

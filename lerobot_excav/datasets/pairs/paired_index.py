@@ -59,8 +59,8 @@ def build_index(root: Path) -> pd.DataFrame:
         root: The dataset.
 
     Returns:
-        One row per episode, ordered by `episode_index`; columns as in `docs/reference/schema.md`. Verdicts are taken over
-        from the stored index, if there is one, for episodes whose traces are unchanged.
+        One row per episode, ordered by `episode_index`; columns as in `docs/reference/schema.md`. Verdicts are taken from
+        the stored index, if there is one, for episodes whose traces are unchanged.
 
     Raises:
         DatasetError: A column is missing, or contradicts another.
