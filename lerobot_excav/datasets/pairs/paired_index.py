@@ -59,7 +59,7 @@ def build_index(root: Path) -> pd.DataFrame:
         root: The dataset.
 
     Returns:
-        One row per episode, ordered by `episode_index`; columns as in `docs/reference/schema.md`. Verdicts are taken from
+        One row per episode, ordered by `episode_index`; columns as in `docs/reference/schema.md`. Verdicts come from
         the stored index, if there is one, for episodes whose traces are unchanged.
 
     Raises:
