@@ -8,8 +8,8 @@ needs (`lerobot-excav index` does it): one JSON object per recorded episode,
 
 `episode_index` is the episode's number in the dataset when it was recorded, `commands` after how many actions which
 target was commanded, `settings` what the simulation was set to, `frames` how many actions were carried out, and
-`restarts` after which of them somebody restarted or changed the scene within the episode; an episode with restarts is
-not a single demonstration and cannot be re-simulated from its start.
+`restarts` after which of them somebody restarted or changed the scene within the episode, or the machine was held still
+until its mask was found; an episode with restarts cannot be re-simulated from its start.
 
 A line is written when its episode has ended and is not being re-recorded. Where two lines have one
 `episode_index`, the later holds: an interrupted recording that was resumed records that number again. For

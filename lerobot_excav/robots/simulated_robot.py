@@ -59,6 +59,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._skipped = 0
         self._number = self._first  # counts targets over all scenes
         self._is_homing = False
+        self._held_frames = 0
         log_path = config.session_log or default_path(f"{self.name}_sessions", datetime.now())
         self._log = SessionLog(log_path, spec, self.settings)
         self._phases = RecordingPhases(
@@ -194,6 +195,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._observation, *_, info = env.step(command)
         self._is_homing = False
         self._log.count_frame(info.get("target_id"))
+        if info["mask_missing_frames"] > self._held_frames:
+            self._log.note_restart()  # the machine was held still: actions alone do not lead here
+        self._held_frames = info["mask_missing_frames"]
         self._require_mask(info)
         return dict(zip(names, command.tolist(), strict=True))
 
@@ -219,6 +223,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         """Reset the environment to the current scene and target."""
         options = {"scene_id": self.scene_id, "target_id": self.target_id}
         self._observation, info = self.env.reset(options=options)
+        self._held_frames = info["mask_missing_frames"]
         self._is_homing = False
         self._require_mask(info)
         self.episode_count += 1
@@ -229,6 +234,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             self._number = self._first + self._skipped + episode_index
         self.start_scene()
         self._log.begin(episode_index, scene_id=self.scene_id, target_id=self.target_id)
+        if self._held_frames:
+            self._log.note_restart()
 
     def _drives_home(self, action: Mapping[str, Any]) -> bool:
         """Tell whether an action holds positions only, and the machine takes none."""

@@ -19,6 +19,7 @@ class StandInEnv:
     def __init__(self, robot):
         self._robot = robot
         self.is_closed = self.mask_missing = False
+        self.held = 0
         self.actions = []
 
     def reset(self, *, options):
@@ -33,7 +34,7 @@ class StandInEnv:
         return self._observe(), 0.0, False, False, self.info()
 
     def info(self):
-        return {"target_id": self.target_id, "mask_missing": self.mask_missing}
+        return {"target_id": self.target_id, "mask_missing": self.mask_missing, "mask_missing_frames": self.held}
 
     def depth_m(self):
         return np.ones(self._robot.settings.observation_size, np.float32)

@@ -144,6 +144,17 @@ def test_the_session_log_tells_settings_and_commands(make_robot, still, caplog):
     assert episode.simulation_version == robot.task_spec.simulation_version
 
 
+def test_an_episode_that_waited_for_its_mask_is_marked(make_robot, still):
+    robot = make_robot()
+    begin_episode(0)
+    for held in (0, 3, 3):
+        robot.env.held = held
+        robot.send_action(still)
+    path = robot.config.session_log
+    robot.disconnect()
+    assert read_session(path)[0].restarts == [2]
+
+
 def test_a_robot_without_a_mask_is_not_driven(make_robot, still):
     robot = make_robot(target_id=1)
     robot.env.mask_missing = True

@@ -56,7 +56,7 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
 
 
 def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_restarted: bool) -> list[int]:
-    """Return the episodes of a recording in which the scene was not restarted.
+    """Return the episodes of a recording in which the scene was not restarted and no mask was waited for.
 
     Args:
         session: The session by episode index.
@@ -71,7 +71,8 @@ def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_resta
         restarts = {index: session[index].restarts for index in range(total) if session[index].restarts}
         places = "; ".join(f"episode {index} at frame {list(frames)}" for index, frames in restarts.items())
         raise DatasetError(
-            f"the scene was restarted within {places}, which is no single demonstration; leave such episodes out "
+            f"the scene was restarted, or the machine waited for its mask, within {places}, so its actions alone do not "
+            "lead from start to end; leave such episodes out "
             "with --skip_restarted, if others remain, or record again (lerobot-record re-records an episode with the "
             "left arrow key, or r)"
         )

@@ -26,7 +26,7 @@ class Episode:
         target_id: Target that is commanded, (n,) int64.
         task_state: How far the task is, (n, k) float32.
         success: Outcome of the episode.
-        mask_missing: Whether the episode was given up because no mask was found.
+        mask_missing_frames: Frames in which the machine was held still because no mask was found.
         metrics: Outcome part by part, after the last action.
     """
 
@@ -38,7 +38,7 @@ class Episode:
     target_id: NDArray[Any]
     task_state: NDArray[Any]
     success: bool
-    mask_missing: bool
+    mask_missing_frames: int
     metrics: dict[str, Any]
 
     @property
@@ -104,7 +104,7 @@ def _play(
         task=env.task_description,
         images={camera: columns.pop(camera) for camera in cameras},
         success=success,
-        mask_missing=bool(info["mask_missing"]),
+        mask_missing_frames=info["mask_missing_frames"],
         metrics=dict(metrics),
         **columns,
     )

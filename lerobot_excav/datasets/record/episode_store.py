@@ -47,7 +47,7 @@ class EpisodeStore:
             "success": episode.success,
             "frames": episode.length,
             "kept": keep_frames,
-            "mask_missing": episode.mask_missing,
+            "mask_missing_frames": episode.mask_missing_frames,
             "metrics": episode.metrics,
         }
         if keep_frames:
@@ -79,7 +79,7 @@ class EpisodeStore:
             target_id=arrays["target_id"],
             task_state=arrays["task_state"],
             success=bool(outcome["success"]),
-            mask_missing=bool(outcome["mask_missing"]),
+            mask_missing_frames=outcome["mask_missing_frames"],
             metrics=outcome["metrics"],
         )
 

@@ -31,8 +31,8 @@ def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) 
         Outcome of the episode.
     """
     episode = play_demonstration(settings, pair)
-    # An episode without a mask would teach a policy to work without a command.
-    keep = (episode.success or settings.keep_failures) and not episode.mask_missing
+    # An episode that waited for its mask has frames that no action led to: it could not be played again.
+    keep = (episode.success or settings.keep_failures) and episode.mask_missing_frames == 0
     return EpisodeStore(folder).write(episode, keep_frames=keep)
 
 

@@ -356,6 +356,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
             "scene_id": self.scene_id,
             "target_id": self.target_id,
             "mask_missing": self.mask_missing,
+            "mask_missing_frames": self._missing_frames,
         }
         if self.depth_info:
             info["depth_m"] = self.depth_m()

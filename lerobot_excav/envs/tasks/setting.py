@@ -103,7 +103,10 @@ def check_settings(settings: Any, prefix: str = "") -> None:
     """
     types = typing.get_type_hints(type(settings))
     for name, allowed in declared_settings(type(settings)).items():
-        _check(f"{prefix}{name}", getattr(settings, name), types[name], allowed)
+        value = getattr(settings, name)
+        _check(f"{prefix}{name}", value, types[name], allowed)
+        if isinstance(value, Integral) and not isinstance(value, int):
+            setattr(settings, name, int(value))  # NumPy's own numbers do not go into JSON
 
 
 def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
@@ -123,7 +126,7 @@ def _is_of(value: Any, kind: Any) -> bool:
     if kind is int:
         return isinstance(value, Integral)
     if kind is float:
-        return isinstance(value, int | float) and math.isfinite(value)
+        return isinstance(value, int) or (isinstance(value, float) and math.isfinite(value))
     if kind is Path:
         return isinstance(value, str | Path)
     return isinstance(value, kind) if isinstance(kind, type) else True
