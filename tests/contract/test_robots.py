@@ -144,9 +144,10 @@ def test_the_session_log_tells_settings_and_commands(make_robot, still, caplog):
     assert episode.simulation_version == robot.task_spec.simulation_version
 
 
-def test_an_episode_that_waited_for_its_mask_is_marked(make_robot, still):
+def test_an_episode_that_waited_for_its_mask_is_marked(make_robot, still, caplog):
     robot = make_robot()
-    begin_episode(0)
+    with caplog.at_level(logging.INFO):
+        logging.info("Recording episode 0")
     for held in (0, 3, 3):
         robot.env.held = held
         robot.send_action(still)
@@ -192,7 +193,7 @@ def test_the_connected_robot_can_be_found(make_robot, robot_type):
         ("observation_height", 8, "32 to 1024"),
         ("scene_set", "exam", "train, val, test"),
         ("mask_condition", "wrong", "mismatched"),
-        ("scene_id", -1, "from 0 to"),
+        ("scene_id", -1, "from 0 on"),
         ("target_id", 4, "0, 1, 2, 3"),
         ("advance", "never", "episode, button"),
     ],

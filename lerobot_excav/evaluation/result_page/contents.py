@@ -21,11 +21,9 @@ class _Table(BaseModel):
 
 
 class Row(_Table):
-    """A row: one evaluation.
+    """A row: one evaluation, whose metrics have the name `label`; `about` is its policy in words.
 
     Attributes:
-        label: Name of its metrics.
-        about: The policy, in words.
         paper: Figures of the paper by key of their column, rates in percent.
     """
 
@@ -51,24 +49,14 @@ class Section(_Table):
 
 
 class CurveSource(_Table):
-    """Evaluations of the checkpoints of one training.
-
-    Attributes:
-        label: Name in the plot.
-        folder: Folder with an evaluation per checkpoint, named by its step.
-    """
+    """Evaluations of the checkpoints of one training: their folder, where each is named by its step, and its label."""
 
     label: str
     folder: str
 
 
 class Clips(_Table):
-    """Clips of one evaluation, side by side in the video grid.
-
-    Attributes:
-        label: Name of the metrics.
-        episodes: Which episodes.
-    """
+    """Episodes of the row with a label, side by side in the video grid."""
 
     label: str
     episodes: tuple[int, ...]
@@ -144,15 +132,9 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
 
 def _moved(contents: Contents, metrics: Path) -> Contents:
     """Return the contents with the metrics of rows and curves elsewhere."""
-    curves = [
-        curve.model_copy(update={"folder": str(_moved_curve(Path(curve.folder), contents.metrics, metrics))})
-        for curve in contents.curve
-    ]
+    curves = []
+    for curve in contents.curve:
+        kept = metrics / CURVES / Path(curve.folder).name
+        seen_from_there = os.path.normpath(metrics / os.path.relpath(curve.folder, contents.metrics))
+        curves.append(curve.model_copy(update={"folder": str(kept) if kept.exists() else seen_from_there}))
     return contents.model_copy(update={"metrics": str(metrics), "curve": tuple(curves)})
-
-
-def _moved_curve(folder: Path, metrics: str, moved_metrics: Path) -> Path:
-    """Return where the metrics of a curve lie when those of the rows lie elsewhere."""
-    kept = moved_metrics / CURVES / folder.name
-    seen_from_there = Path(os.path.normpath(moved_metrics / os.path.relpath(folder, metrics)))
-    return kept if kept.exists() else seen_from_there

@@ -146,13 +146,6 @@ def test_a_task_gives_the_same_alone_and_beside_others(tmp_path, task):
     assert spec.measures.record.model_validate_json(path.read_text().splitlines()[0])
 
 
-@pytest.mark.parametrize("use_async", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_lerobot_learns_the_length(use_async):
-    env = ExcavatorEnvConfig(episode_length=7).create_envs(2, use_async_envs=use_async)["excavator"][0]
-    assert env.call("_max_episode_steps") == (7, 7)
-    env.close()
-
-
 def test_surplus_episodes_are_recognisable(run):
     counted, lines = run(3, max_episodes=None)
     assert [line["episode_ix"] for line in lines] == [0, 1, 2, 3, 4, 5]
