@@ -71,8 +71,8 @@ def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_resta
         restarts = {index: session[index].restarts for index in range(total) if session[index].restarts}
         places = "; ".join(f"episode {index} at frame {list(frames)}" for index, frames in restarts.items())
         raise DatasetError(
-            f"the scene was restarted, or the machine waited for its mask, within {places}, so its actions alone do not "
-            "lead from start to end; leave such episodes out "
+            f"the scene was restarted, or the machine waited for its mask, within {places}, so actions alone do not "
+            "lead from its start to its end; leave such episodes out "
             "with --skip_restarted, if others remain, or record again (lerobot-record re-records an episode with the "
             "left arrow key, or r)"
         )
