@@ -15,12 +15,7 @@ from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
 def evaluate_operator(
-    settings: PlayedScenes,
-    path: Path,
-    *,
-    workers: int = 2,
-    resume: bool = False,
-    show_progress: bool = True,
+    settings: PlayedScenes, path: Path, *, workers: int = 2, resume: bool = False, show_progress: bool = True
 ) -> None:
     """Let the scripted operator play scenes without pictures, and write a metrics file.
 
@@ -57,11 +52,7 @@ def _play_rest(
     settings: PlayedScenes, partial: Path, pairs: list[Pair], first: int, workers: int, *, show: bool
 ) -> None:
     """Play the pairs from `first` on and append their lines."""
-    with (
-        partial.open("a") as file,
-        worker_pool(workers) as pool,
-        EpisodeProgress(len(pairs), show=show) as progress,
-    ):
+    with partial.open("a") as file, worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show) as progress:
         for _ in range(first):
             progress.skip()
         futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]

@@ -35,10 +35,7 @@ def measure_environment(settings: DemonstrationSettings) -> list[Measurement]:
         for pair in settings.pairs():
             frames += play_demonstration(settings, pair, with_images=with_images).length
         rate = frames / (time.perf_counter() - start)
-        results += [
-            Measurement(name, rate, "steps/s"),
-            Measurement(name, rate / settings.env.fps, "x real time"),
-        ]
+        results += [Measurement(name, rate, "steps/s"), Measurement(name, rate / settings.env.fps, "x real time")]
     return results
 
 

@@ -63,10 +63,7 @@ def played[Played: PlayedScenes](kind: type[Played], arguments: PlayedScenes) ->
 
 def run(arguments: DemosArguments) -> int:
     """Record, and say what was recorded."""
-    require(
-        arguments.out is not None,
-        "--out is missing; give the folder of the dataset, such as --out=outputs/paired",
-    )
+    require(arguments.out is not None, "--out is missing; give the folder of the dataset, such as --out=outputs/paired")
     # Slow to import (LeRobot, PyTorch), so after the arguments are known to be right.
     from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 

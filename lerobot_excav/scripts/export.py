@@ -48,10 +48,7 @@ def run(arguments: ExportArguments) -> int:
             "checkpoint is missing; give the pretrained_model folder of a run of lerobot-train, for example "
             "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging"
         )
-    require(
-        arguments.out is not None,
-        "--out is missing; give the folder to write, such as --out=checkpoints/digging",
-    )
+    require(arguments.out is not None, "--out is missing; give the folder to write, such as --out=checkpoints/digging")
     facts = CardFacts(
         title=arguments.title,
         env_type=arguments.env,

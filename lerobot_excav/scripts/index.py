@@ -71,10 +71,7 @@ def run(arguments: IndexArguments) -> int:
 
 
 def _require_options_with_effect(arguments: IndexArguments) -> None:
-    for option, given in (
-        ("--out", arguments.out is not None),
-        ("--skip_restarted", arguments.skip_restarted),
-    ):
+    for option, given in (("--out", arguments.out is not None), ("--skip_restarted", arguments.skip_restarted)):
         require(not given or arguments.session is not None, f"{option} is of use with --session only")
     require(
         arguments.eval_fraction is None or arguments.split is not None,

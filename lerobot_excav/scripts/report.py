@@ -55,15 +55,11 @@ def run(arguments: ReportArguments) -> int:
         DatasetError: A metrics file cannot be used.
     """
     require(
-        bool(arguments.metrics) != (arguments.rows is not None),
-        "give either metrics files or --rows, and not both",
+        bool(arguments.metrics) != (arguments.rows is not None), "give either metrics files or --rows, and not both"
     )
     if arguments.rows is not None:
         return _page(arguments)
-    require(
-        arguments.metrics_folder is None,
-        f"--metrics_folder={arguments.metrics_folder} is of use with --rows only",
-    )
+    require(arguments.metrics_folder is None, f"--metrics_folder={arguments.metrics_folder} is of use with --rows only")
     operator = None
     if arguments.operator is not None:
         operator = Run(label="operator", evaluations=(read_evaluation(arguments.operator),))

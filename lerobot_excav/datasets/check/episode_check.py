@@ -36,11 +36,7 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
     frames = episode.array("frame_index")
     if not np.array_equal(frames, np.arange(episode.length)):
         yield f"frames are not numbered 0 to {episode.length - 1}"
-    for name, values in (
-        (STATE_KEY, episode.state),
-        ("action", episode.action),
-        (TASK_STATE_KEY, episode.task_state),
-    ):
+    for name, values in ((STATE_KEY, episode.state), ("action", episode.action), (TASK_STATE_KEY, episode.task_state)):
         if not np.isfinite(values).all():
             yield f"{name} is not finite at frame {int(np.argmin(np.isfinite(values).all(axis=1)))}"
     names = episode.spec.action_names

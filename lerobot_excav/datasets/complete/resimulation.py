@@ -45,11 +45,7 @@ STATE_TOLERANCE = 1e-4
 
 
 def complete_recording(
-    root: Path,
-    session_path: Path,
-    *,
-    out: Path | None = None,
-    skip_restarted: bool = False,
+    root: Path, session_path: Path, *, out: Path | None = None, skip_restarted: bool = False
 ) -> Path:
     """Add the `excav.*` columns to a recording, and its index.
 

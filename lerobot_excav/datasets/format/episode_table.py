@@ -231,10 +231,7 @@ def iterate_episodes(
                 length=rows.num_rows,
                 spec=info.spec,
                 columns={key: rows[key] for key in columns if key not in stored["image"]},
-                pictures={
-                    **{key: StoredImages(rows[key]) for key in stored["image"]},
-                    **spans.get(index, {}),
-                },
+                pictures={**{key: StoredImages(rows[key]) for key in stored["image"]}, **spans.get(index, {})},
             )
 
 

@@ -24,12 +24,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
 
 
 def select(
-    index: pd.DataFrame,
-    composition: str,
-    *,
-    episodes: int | None = None,
-    scenes: int | None = None,
-    seed: int = 0,
+    index: pd.DataFrame, composition: str, *, episodes: int | None = None, scenes: int | None = None, seed: int = 0
 ) -> pd.DataFrame:
     """Choose a subset of episodes.
 
@@ -88,10 +83,7 @@ def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.
     targets = rows["target_id"].nunique()
     complete = rows.groupby("scene_rank")["target_id"].transform("nunique") == targets
     if episodes is not None:
-        require(
-            episodes % targets == 0,
-            f"--episodes={episodes} is no multiple of the {targets} targets per scene",
-        )
+        require(episodes % targets == 0, f"--episodes={episodes} is no multiple of the {targets} targets per scene")
         scenes = episodes // targets
     ranks = rows[complete]["scene_rank"].drop_duplicates()
     if ranks.empty:

@@ -34,14 +34,7 @@ IMAGE_THREADS = 2
 
 # Every second picture is a key frame: shorter files do not make up for more of them, and longer runs must be decoded to
 # get at one picture (kind: measured, as is the codec: of the lossless ones read alike, it encodes fastest).
-VIDEO_ENCODER = {
-    "vcodec": "h264",
-    "pix_fmt": "yuv444p",
-    "crf": 0,
-    "g": 2,
-    "preset": "veryfast",
-    "fast_decode": 1,
-}
+VIDEO_ENCODER = {"vcodec": "h264", "pix_fmt": "yuv444p", "crf": 0, "g": 2, "preset": "veryfast", "fast_decode": 1}
 # Below the size of any episode, so that each has its own files: without torchcodec LeRobot opens a file for every
 # picture, and that costs the more the longer the file is (measured: 3.5 ms with 400 pictures, 25 ms with 80 000).
 VIDEO_FILE_SIZE_MB = 0.001

@@ -87,12 +87,7 @@ class PlayedScenes:
             Pair(self.env.ENV_TYPE, scene_set, scene_id, target_id)
             for scene_id in range(self.first_scene, self.first_scene + self.scenes)
             for target_id in targets_of_scene(
-                self.target_rule,
-                self.targets,
-                seed=self.seed,
-                scene_set=scene_set,
-                scene_id=scene_id,
-                nearest=nearest,
+                self.target_rule, self.targets, seed=self.seed, scene_set=scene_set, scene_id=scene_id, nearest=nearest
             )
         ]
 

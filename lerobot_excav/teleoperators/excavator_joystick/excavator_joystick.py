@@ -26,12 +26,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
     name = "excavator_joystick"
     action_names = ACTION_NAMES
 
-    def __init__(
-        self,
-        config: ExcavatorJoystickConfig,
-        *,
-        open_device: OpenDevice = open_gamepad,
-    ) -> None:
+    def __init__(self, config: ExcavatorJoystickConfig, *, open_device: OpenDevice = open_gamepad) -> None:
         super().__init__(config)
         self.config = config
         self._open_device = open_device

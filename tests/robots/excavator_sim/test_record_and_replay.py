@@ -42,11 +42,7 @@ def _run_on_excavator(run_command: Run, main: Callable[[], None], *arguments: st
 @pytest.fixture
 def record(run: Run, tmp_path: Path) -> Run:
     def _record(*arguments: str) -> None:
-        flags = [
-            "--teleop.type=excavator_operator",
-            f"--teleop.calibration_dir={tmp_path}",
-            "--dataset.fps=10",
-        ]
+        flags = ["--teleop.type=excavator_operator", f"--teleop.calibration_dir={tmp_path}", "--dataset.fps=10"]
         flags += ["--dataset.single_task=dig", "--dataset.episode_time_s=1.2", "--dataset.reset_time_s=0.2"]
         flags += ["--dataset.video=false", "--dataset.push_to_hub=false", "--dataset.no_stamp=true"]
         run(lerobot_record.main, *flags, *arguments)
@@ -107,11 +103,7 @@ def test_a_recording_has_the_schema_of_scripted_data(record: Run, tmp_path: Path
 
 
 def test_an_episode_recorded_again_starts_over(record: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    keys = {
-        "exit_early": False,
-        "rerecord_episode": True,
-        "stop_recording": False,
-    }  # LeRobot takes it back itself
+    keys = {"exit_early": False, "rerecord_episode": True, "stop_recording": False}  # LeRobot takes it back itself
     monkeypatch.setattr(lerobot_record, "init_keyboard_listener", lambda: (None, keys))
     record("--dataset.num_episodes=1", "--robot.target_id=2")
     dataset, (episode,) = dataset_of(tmp_path), session_of(tmp_path)
