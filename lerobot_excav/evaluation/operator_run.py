@@ -21,13 +21,6 @@ def evaluate_operator(
 
     Until it is complete the file is called `PATH.partial`; its lines are in the order of the settings.
 
-    Args:
-        settings: What to play.
-        path: Metrics file; its folder is made.
-        workers: Worker processes; 0 works in this process.
-        resume: Whether to continue an interrupted run.
-        show_progress: Whether to draw a progress bar.
-
     Raises:
         DatasetError: The file exists, or an interrupted run is in the way.
         ConfigurationError: The interrupted run has other settings.

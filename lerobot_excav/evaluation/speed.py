@@ -12,13 +12,7 @@ from lerobot_excav.datasets.record.simulation import play_demonstration
 
 
 class Measurement(NamedTuple):
-    """One measured number.
-
-    Attributes:
-        name: What was measured.
-        value: The number.
-        unit: Its unit.
-    """
+    """One measured number."""
 
     name: str
     value: float
@@ -76,12 +70,7 @@ def measure_demonstrations(settings: DemonstrationSettings, *, workers: int) -> 
 
 
 def measures(settings: DemonstrationSettings, *, workers: int) -> dict[str, Callable[[], list[Measurement]]]:
-    """Return what can be measured, by name.
-
-    Args:
-        settings: What is played and recorded.
-        workers: Worker processes of the demonstrations.
-    """
+    """Return what can be measured, by name."""
     return {
         "environment": lambda: measure_environment(settings),
         "writing": lambda: measure_writing(settings),

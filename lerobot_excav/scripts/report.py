@@ -91,10 +91,9 @@ def _page(arguments: ReportArguments) -> int:
 
 
 def runs_from(results: list[str]) -> list[Run]:
-    """Read runs in the order of their first mention.
+    """Read runs in the order of their first mention, `[LABEL=]PATH` each.
 
-    Args:
-        results: `[LABEL=]PATH` each; without a label, the name of the file, or of its folder if that says more.
+    Without a label, it is the name of the file, or of its folder if that says more.
 
     Raises:
         ConfigurationError: One file was given twice, or two runs without a label would have the same name.

@@ -47,7 +47,7 @@ def test_an_error_is_one_line_and_exit_code_2(capsys, tmp_path):
     ):
         assert main(["qc", str(folder)]) == 2
         assert capsys.readouterr().err == f"lerobot-excav qc: {problem}\n"
-    for command, missing in (("qc", "the folder of a dataset"), ("demos", "--out"), ("operator", "--metrics")):
+    for command, missing in (("qc", "dataset"), ("demos", "--out"), ("operator", "--metrics")):
         assert main([command]) == 2
         assert f"{missing} is missing" in capsys.readouterr().err
 

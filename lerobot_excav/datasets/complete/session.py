@@ -58,14 +58,9 @@ class SessionEpisode(BaseModel):
 
 
 def read_session(path: Path) -> dict[int, SessionEpisode]:
-    """Read a session.
+    """Read the episodes of a session, by index.
 
-    Args:
-        path: The JSON Lines file.
-
-    Returns:
-        Episodes by index. Of two lines with one index the later counts: the robot repeats a number when an episode
-        was recorded again.
+    Of two lines with one index the later counts: the robot repeats a number when an episode was recorded again.
 
     Raises:
         DatasetError: The file is missing, or a line is not what it should be: it lacks a field, or has an environment,

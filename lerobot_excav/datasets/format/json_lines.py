@@ -21,11 +21,7 @@ class Line(NamedTuple):
     record: dict[str, Any]
 
     def read[Model: BaseModel](self, model: type[Model], *, hint: str) -> Model:
-        """Make an object of the line.
-
-        Args:
-            model: What it should be.
-            hint: What to do if it is something else.
+        """Make an object of the line; `hint` says what to do if it is something else.
 
         Raises:
             DatasetError: A field is missing, unknown or has a value that is not possible; the message names each.
@@ -38,11 +34,7 @@ class Line(NamedTuple):
 
 
 def read_json_lines(path: Path, *, origin: str) -> list[Line]:
-    """Read all objects of a file.
-
-    Args:
-        path: The file.
-        origin: What writes such a file, for the message if it is missing.
+    """Read all objects of a file; `origin` says what writes such a file.
 
     Raises:
         DatasetError: The file is missing, or a line is no JSON object; the message names the line.

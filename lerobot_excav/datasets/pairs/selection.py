@@ -11,12 +11,7 @@ COMPOSITIONS = ("all", "paired", "non-paired", "balanced")
 
 
 def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFrame:
-    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair and soil.
-
-    Args:
-        index: A paired-scene index.
-        include_failures: Whether to keep episodes without success.
-    """
+    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair and soil."""
     rows = index[index["qc"] != FAILED]
     if not include_failures:
         rows = rows[rows["success"]]
@@ -115,10 +110,8 @@ def _balanced(rows: pd.DataFrame, episodes: int | None) -> pd.DataFrame:
             f"--episodes={episodes} is no multiple of {len(counts)} targets, so it cannot be balanced",
         )
         per_target = episodes // len(counts)
-    groups = [
-        _first(group, per_target, f"episodes with target {target}") for target, group in rows.groupby("target_id")
-    ]
-    return pd.concat(groups)
+    groups = rows.groupby("target_id")
+    return pd.concat([_first(group, per_target, f"episodes with target {target}") for target, group in groups])
 
 
 def _first[Rows: (pd.DataFrame, pd.Series)](rows: Rows, count: int | None, what: str) -> Rows:

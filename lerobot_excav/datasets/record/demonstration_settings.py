@@ -114,12 +114,7 @@ class DemonstrationSettings(PlayedScenes):
 
     @classmethod
     def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":
-        """Make settings of an environment named by its `--env.type`.
-
-        Args:
-            env_type: The environment.
-            env: Settings of the environment that differ from the defaults.
-            settings: The other fields that do.
+        """Make settings of an environment named by its `--env.type`; `env` holds those of the environment itself.
 
         Raises:
             ConfigurationError: There is no such environment, or a field is not possible in it.
@@ -140,11 +135,7 @@ class DemonstrationSettings(PlayedScenes):
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], *, source: Path) -> "DemonstrationSettings":
-        """Rebuild settings from `as_record`.
-
-        Args:
-            record: What `as_record` returned.
-            source: Where it was stored, for messages.
+        """Rebuild settings from `as_record`, which was stored in the file `source`.
 
         Raises:
             ConfigurationError: It belongs to another version of the simulation, or a field is missing or unknown.
@@ -166,9 +157,6 @@ class DemonstrationSettings(PlayedScenes):
 
     def require_same(self, other: "DemonstrationSettings") -> None:
         """Check that a started run has these settings.
-
-        Args:
-            other: Settings of the started run.
 
         Raises:
             ConfigurationError: A field differs.
