@@ -158,11 +158,20 @@ def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed
         read_session(session({1: changes}))
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks simulation_v")])
-def test_a_damaged_session_names_the_line(tmp_path, text, message):
-    (tmp_path / "s.jsonl").write_text(text)
-    with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "Invalid JSON: .* Remove the line if it is the last"),
+        ("[3]", "Input should be an object"),
+        ('{"episode_index": 0}', "lacks simulation_version; lacks env;"),
+    ],
+)
+def test_a_damaged_or_missing_session_is_named(tmp_path, text, message):
+    (tmp_path / "s.jsonl").write_text(f"\n{text}")
+    with pytest.raises(DatasetError, match=rf"s\.jsonl:2: {message}"):
         read_session(tmp_path / "s.jsonl")
+    with pytest.raises(DatasetError, match="none does not exist; the robot wrote its session to --robot.session_log"):
+        read_session(tmp_path / "none")
 
 
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):
