@@ -42,9 +42,8 @@ def record(run_command, tmp_path):
             *flags("teleop", {"type": operator, "calibration_dir": tmp_path}),
             *flags("dataset", dataset),
         )
-        return dataset_of(tmp_path), [
-            json.loads(line) for line in (tmp_path / "session.jsonl").read_text().splitlines()
-        ]
+        lines = (tmp_path / "session.jsonl").read_text().splitlines()
+        return dataset_of(tmp_path), [json.loads(line) for line in lines]
 
     return _record
 

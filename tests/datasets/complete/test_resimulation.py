@@ -170,7 +170,7 @@ def test_a_damaged_or_missing_session_is_named(tmp_path, text, message):
     (tmp_path / "s.jsonl").write_text(f"\n{text}")
     with pytest.raises(DatasetError, match=rf"s\.jsonl:2: {message}"):
         read_session(tmp_path / "s.jsonl")
-    with pytest.raises(DatasetError, match="none does not exist; the robot wrote its session to --robot.session_log"):
+    with pytest.raises(DatasetError, match=r"none does not exist; .* --robot\.session_log"):
         read_session(tmp_path / "none")
 
 

@@ -69,15 +69,13 @@ def test_what_makes_no_sense_in_an_environment_is_refused(env_type, env, setting
         make(env_type, env, **settings)
 
 
-def test_defaults_are_those_of_the_environment():
-    arm, excavator = make("fr5_grasp"), make("excavator")
-    assert (arm.task_spec.id, arm.env.fps, arm.episode_length, arm.storage) == ("FR5Grasp-v0", 50, 400, "video")
-    assert (excavator.env.soil, excavator.episode_length, excavator.storage) == ("sand", 200, "image")
-
-
-@pytest.mark.parametrize(("env_type", "fps", "frames"), [("fr5_grasp", 25, 200), ("excavator", 5, 100)])
-def test_an_episode_lasts_as_long_at_another_frame_rate(env_type, fps, frames):
-    assert make(env_type, {"fps": fps}).episode_length == frames
+@pytest.mark.parametrize(
+    ("env_type", "fps", "frames", "storage"),
+    [("fr5_grasp", 50, 400, "video"), ("fr5_grasp", 25, 200, "video"), ("excavator", 5, 100, "image")],
+)
+def test_length_and_storage_suit_the_environment_and_its_frame_rate(env_type, fps, frames, storage):
+    settings = make(env_type, {"fps": fps})
+    assert (settings.episode_length, settings.storage) == (frames, storage)
     assert make(env_type, {"fps": fps, "episode_length": 7}).episode_length == 7
 
 
