@@ -79,10 +79,7 @@ def _episode(line: str, place: str) -> SessionEpisode:
         _require_playable(episode)
     except ValidationError as error:
         problems = "; ".join(map(_in_words, error.errors()))
-        raise DatasetError(
-            f"{place}: {problems}; is it a session log of a simulated robot? Remove the line if it is the last, and "
-            "the robot was interrupted while it wrote it"
-        ) from None
+        raise DatasetError(f"{place}: {problems}; is it a session log of a simulated robot?") from None
     except ConfigurationError as error:
         raise DatasetError(f"{place}: {error}") from None
     return episode
@@ -90,8 +87,13 @@ def _episode(line: str, place: str) -> SessionEpisode:
 
 def _in_words(problem: Any) -> str:
     name = ".".join(map(str, problem["loc"]))
-    words = {"missing": f"lacks {name}", "extra_forbidden": f"{name} is not known"}
-    return words.get(problem["type"], f"{name}={problem['input']!r}: {problem['msg']}" if name else problem["msg"])
+    words = {
+        "missing": f"lacks {name}",
+        "extra_forbidden": f"{name} is not known",
+        "json_invalid": f"not JSON ({problem['msg']}); was its writer interrupted? Remove the line if it is the last",
+        "model_type": "a JSON object is expected",
+    }
+    return words.get(problem["type"], f"{name}={problem['input']!r}: {problem['msg']}")
 
 
 def _require_playable(episode: SessionEpisode) -> None:

@@ -1,6 +1,6 @@
 """Writing finished episodes as a LeRobot dataset, through its public interface."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from lerobot_excav.envs.tasks.settings import TaskSettings
 
 # Encoding a picture releases the interpreter lock; two threads hide most of it behind the rest (measured).
 IMAGE_THREADS = 2
-
 
 # Every second picture is a key frame: shorter files do not make up for more of them, and longer runs must be decoded to
 # get at one picture (kind: measured, as is the codec: of the lossless ones read alike, it encodes fastest).
@@ -44,15 +43,14 @@ def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDatase
         features=features,
         robot_type=settings.task_spec.robot_type,
         video_backend="pyav",  # never used; looking for a better one prints a page where none is installed
-        **_WRITERS[str(settings.storage)](settings),
+        **_writer(settings),
     )
 
 
-def _image_writer(settings: DemonstrationSettings) -> dict[str, Any]:
-    return {"use_videos": False, "image_writer_threads": IMAGE_THREADS}
-
-
-def _video_writer(settings: DemonstrationSettings) -> dict[str, Any]:
+def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
+    """Return how LeRobot is to write the pictures."""
+    if settings.storage == "image":
+        return {"use_videos": False, "image_writer_threads": IMAGE_THREADS}
     # LeRobot's encoders give libav's messages back to the terminal while others are at work.
     av.logging.set_libav_level(av.logging.ERROR)
     return {
@@ -64,12 +62,6 @@ def _video_writer(settings: DemonstrationSettings) -> dict[str, Any]:
         "encoder_queue_maxsize": settings.episode_length + 1,
         "encoder_threads": 1,
     }
-
-
-_WRITERS: dict[str, Callable[[DemonstrationSettings], dict[str, Any]]] = {
-    "image": _image_writer,
-    "video": _video_writer,
-}
 
 
 def constant_columns(episode: Episode, settings: TaskSettings) -> dict[str, Any]:

@@ -136,7 +136,7 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"restarts": None}, "restarts=None: Input should be a valid list"),
+        ({"restarts": None}, "restarts=None: Input should be a valid array"),
         ({"restarts": [-1]}, r"restarts\.0=-1: .*greater than or equal to 0"),
         ({"commands": [[0, 9]]}, "commands: target_id=9 .*from 0 to 3"),
         ({"commands": [[1, 2]]}, r"commands=\[\[1, 2\]\] .*it begins with \[0, first target\]"),
@@ -161,8 +161,8 @@ def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "Invalid JSON: .* Remove the line if it is the last"),
-        ("[3]", "Input should be an object"),
+        ("{", "not JSON .* Remove the line if it is the last"),
+        ("[3]", "a JSON object is expected"),
         ('{"episode_index": 0}', "lacks simulation_version; lacks env;"),
     ],
 )
