@@ -15,23 +15,11 @@ from lerobot_excav.errors import ConfigurationError, DatasetError
 
 
 def evaluate_operator(
-    settings: PlayedScenes,
-    path: Path,
-    *,
-    workers: int = 2,
-    resume: bool = False,
-    show_progress: bool = True,
+    settings: PlayedScenes, path: Path, *, workers: int = 2, resume: bool = False, show_progress: bool = True
 ) -> None:
     """Let the scripted operator play scenes without pictures, and write a metrics file.
 
     Until it is complete the file is called `PATH.partial`; its lines are in the order of the settings.
-
-    Args:
-        settings: What to play.
-        path: Metrics file; its folder is made.
-        workers: Worker processes; 0 works in this process.
-        resume: Whether to continue an interrupted run.
-        show_progress: Whether to draw a progress bar.
 
     Raises:
         DatasetError: The file exists, or an interrupted run is in the way.
@@ -57,11 +45,7 @@ def _play_rest(
     settings: PlayedScenes, partial: Path, pairs: list[Pair], first: int, workers: int, *, show: bool
 ) -> None:
     """Play the pairs from `first` on and append their lines."""
-    with (
-        partial.open("a") as file,
-        worker_pool(workers) as pool,
-        EpisodeProgress(len(pairs), show=show) as progress,
-    ):
+    with partial.open("a") as file, worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show) as progress:
         for _ in range(first):
             progress.skip()
         futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]

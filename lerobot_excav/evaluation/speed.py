@@ -12,13 +12,7 @@ from lerobot_excav.datasets.record.simulation import play_demonstration
 
 
 class Measurement(NamedTuple):
-    """One measured number.
-
-    Attributes:
-        name: What was measured.
-        value: The number.
-        unit: Its unit.
-    """
+    """One measured number."""
 
     name: str
     value: float
@@ -35,10 +29,7 @@ def measure_environment(settings: DemonstrationSettings) -> list[Measurement]:
         for pair in settings.pairs():
             frames += play_demonstration(settings, pair, with_images=with_images).length
         rate = frames / (time.perf_counter() - start)
-        results += [
-            Measurement(name, rate, "steps/s"),
-            Measurement(name, rate / settings.env.fps, "x real time"),
-        ]
+        results += [Measurement(name, rate, "steps/s"), Measurement(name, rate / settings.env.fps, "x real time")]
     return results
 
 
@@ -79,12 +70,7 @@ def measure_demonstrations(settings: DemonstrationSettings, *, workers: int) -> 
 
 
 def measures(settings: DemonstrationSettings, *, workers: int) -> dict[str, Callable[[], list[Measurement]]]:
-    """Return what can be measured, by name.
-
-    Args:
-        settings: What is played and recorded.
-        workers: Worker processes of the demonstrations.
-    """
+    """Return what can be measured, by name."""
     return {
         "environment": lambda: measure_environment(settings),
         "writing": lambda: measure_writing(settings),

@@ -47,8 +47,7 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
         default=None,
     )
     depth: bool = setting(
-        "Whether the robot offers the depth image registered with the main camera, to Python code",
-        default=False,
+        "Whether the robot offers the depth image registered with the main camera, to Python code", default=False
     )
 
     def __post_init__(self) -> None:

@@ -16,7 +16,7 @@ _STOP = "Stop recording"
 
 
 class RecordingPhases(logging.Handler):
-    """Call back at every boundary of a recording.
+    """A handler for the root logger that calls back at every boundary of a recording.
 
     Args:
         on_episode: Called with the number of the episode that begins.
@@ -36,14 +36,6 @@ class RecordingPhases(logging.Handler):
         super().__init__(level=logging.INFO)
         self._on_episode = on_episode
         self._on_other = {_RESET: on_pause, _REPEAT: on_discard, _STOP: on_stop}
-
-    def attach(self) -> None:
-        """Start to listen."""
-        logging.getLogger().addHandler(self)
-
-    def detach(self) -> None:
-        """Stop listening."""
-        logging.getLogger().removeHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Recognise an announcement; errors of a callback reach the command, unlike errors of printing."""

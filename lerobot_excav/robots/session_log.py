@@ -27,23 +27,12 @@ from lerobot_excav.errors import DeviceError
 
 
 def default_path(folder: str, now: datetime) -> Path:
-    """Return where a session that began at a time is logged unless the user says otherwise.
-
-    Args:
-        folder: Folder below LeRobot's `outputs` for the sessions of one kind of robot.
-        now: When the session began.
-    """
+    """Return where a session that began now is logged, below LeRobot's `outputs`, unless the user says otherwise."""
     return Path("outputs", folder, f"{now:%Y-%m-%d_%H-%M-%S}.jsonl")
 
 
 class SessionLog:
-    """Append the episodes of a recording session to a file.
-
-    Args:
-        path: File to append to; it is made, with its folder, when the first episode has ended.
-        spec: The task.
-        settings: What the simulation is set to.
-    """
+    """Append the episodes of a recording session to a file; it is made when the first episode has ended."""
 
     def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings) -> None:
         self.path = path
@@ -70,11 +59,7 @@ class SessionLog:
         self._is_running = True
 
     def count_frame(self, target_id: int | None) -> None:
-        """Count an action of the episode; between episodes, count nothing.
-
-        Args:
-            target_id: Target that is commanded after it; None if the simulation does not say.
-        """
+        """Count an action of the episode, after which a target is commanded; between episodes, count nothing."""
         if not self._is_running or self._episode is None:
             return
         self._episode["frames"] += 1

@@ -11,9 +11,10 @@ robot disconnects.
 """
 
 import logging
+import weakref
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Any, override
+from typing import Any, ClassVar, override
 
 import numpy as np
 from lerobot.robots import Robot
@@ -24,7 +25,6 @@ from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.robots import live
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import SessionLog, default_path
@@ -45,6 +45,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         cameras: The cameras by name, with the shape (H, W, 3) of their pictures.
         episode_count: Number of resets so far; changes exactly when an episode starts.
     """
+
+    connected: ClassVar["weakref.WeakSet[SimulatedRobot]"] = weakref.WeakSet()
+    """The simulated robots that are connected in this process."""
 
     def __init__(self, config: SimulatedRobotConfig) -> None:
         super().__init__(config)
@@ -134,8 +137,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._env = self.make_env()
         self._number, self._skipped = self._first, 0
         self.start_scene()
-        self._phases.attach()
-        live.announce(self)
+        logging.getLogger().addHandler(self._phases)
+        self.connected.add(self)
 
     def disconnect(self) -> None:
         """Stop the simulation and complete the session log.
@@ -145,8 +148,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         """
         env = self.env
         self._env = None
-        live.retract(self)
-        self._phases.detach()
+        self.connected.discard(self)
+        logging.getLogger().removeHandler(self._phases)
         env.close()
         self._log.write()
 
@@ -252,14 +255,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
 
 
 def command_from_action(action: Mapping[str, Any], names: tuple[str, ...]) -> NDArray[np.float32]:
-    """Take the commands out of LeRobot's dictionary.
-
-    Args:
-        action: Numbers or tensors of one element by name.
-        names: Names of the commands, in their order.
-
-    Returns:
-        The commands, shape (names,), float32.
+    """Take the commands, (names,) float32, out of LeRobot's dictionary of numbers or tensors of one element.
 
     Raises:
         DeviceError: A command is missing, not a number or not finite.

@@ -15,7 +15,7 @@ from draccus.wrappers.docstring import HelpOrder
 
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.envs.tasks.setting import check_settings, with_default
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 
 @dataclass(kw_only=True)
@@ -33,6 +33,17 @@ class Arguments:
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
         getattr(super(), "__post_init__", lambda: None)()
+
+    def given(self, name: str, what: str) -> Any:
+        """Return the value of an option that has no default.
+
+        Raises:
+            ConfigurationError: It is missing; `what` is what to give.
+        """
+        value = getattr(self, name)
+        option = name if name == self.POSITIONAL else f"--{name}"
+        require(value is not None, f"{option} is missing; give {what}")
+        return value
 
 
 class _Environments:
@@ -65,8 +76,7 @@ class _Environments:
     @classmethod
     def get_choice_class(cls, name: str) -> Any:
         known = cls.get_known_choices()
-        if name not in known:
-            raise ConfigurationError(f"--env.type={name!r} is not known; allowed: {', '.join(known)}.")
+        require_choice("--env.type", name, tuple(known))
         return known[name]
 
     @classmethod
@@ -87,13 +97,7 @@ class EvaluationChoice(_Environments, draccus.ChoiceRegistry):  # type: ignore[m
 def parse_arguments[Parsed: Arguments](
     kind: type[Parsed], argv: Sequence[str], *, command: str, description: str
 ) -> Parsed:
-    """Parse a command line.
-
-    Args:
-        kind: What to make of it.
-        argv: The command line, without the command.
-        command: Name of the command, for usage and errors.
-        description: What the command does, with examples.
+    """Parse a command line, without the command itself; `description` says what that does, with examples.
 
     Raises:
         ConfigurationError: An option is unknown or has a value that is not possible.

@@ -18,10 +18,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
-from lerobot_excav.envs.tasks.registry import task_settings
-from lerobot_excav.envs.tasks.setting import declared_settings, setting, with_default
+from lerobot_excav.envs.tasks.setting import setting, with_default
 from lerobot_excav.scripts.arguments import EnvironmentChoice
-from lerobot_excav.scripts.demos import WorkArguments
+from lerobot_excav.scripts.demos import WorkArguments, played
 
 MEASURES = ("environment", "writing", "demos")
 
@@ -43,8 +42,7 @@ def run(arguments: BenchArguments) -> int:
     """Measure, and print what was measured."""
     from lerobot_excav.evaluation.speed import measures
 
-    values = {name: getattr(arguments, name) for name in declared_settings(PlayedScenes)}
-    settings = DemonstrationSettings(env=task_settings(arguments.env), keep_failures=True, **values)
+    settings = DemonstrationSettings(keep_failures=True, **vars(played(PlayedScenes, arguments)))
     tasks = measures(settings, workers=arguments.workers)
     machine = {"machine": platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
     print(f"{machine['machine']}, {machine['cores']} cores, load {machine['load']:.1f}")

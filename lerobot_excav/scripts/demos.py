@@ -17,13 +17,11 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.workers import MOST_WORKERS
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.setting import declared_settings, setting
-from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 
 
@@ -63,17 +61,12 @@ def played[Played: PlayedScenes](kind: type[Played], arguments: PlayedScenes) ->
 
 def run(arguments: DemosArguments) -> int:
     """Record, and say what was recorded."""
-    require(
-        arguments.out is not None,
-        "--out is missing; give the folder of the dataset, such as --out=outputs/paired",
-    )
+    out = arguments.given("out", "the folder of the dataset, such as --out=outputs/paired")
     # Slow to import (LeRobot, PyTorch), so after the arguments are known to be right.
     from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 
     settings = played(DemonstrationSettings, arguments)
-    summary = record_demonstrations(
-        settings, cast(Path, arguments.out), workers=arguments.workers, resume=arguments.resume
-    )
+    summary = record_demonstrations(settings, out, workers=arguments.workers, resume=arguments.resume)
     print(f"{summary.out}: {summary.episodes} episodes of {settings.scenes} scenes")
     if summary.failures:
         kept = "kept" if settings.keep_failures else "left out"

@@ -13,10 +13,9 @@ Examples:
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import ClassVar
 
 from lerobot_excav.envs.tasks.setting import setting
-from lerobot_excav.errors import ConfigurationError, require
 from lerobot_excav.scripts.arguments import Arguments
 
 
@@ -43,22 +42,19 @@ def run(arguments: ExportArguments) -> int:
     from lerobot_excav.policies.mask_act.export import export_checkpoint
     from lerobot_excav.policies.mask_act.model_card import CardFacts
 
-    if arguments.checkpoint is None:
-        raise ConfigurationError(
-            "checkpoint is missing; give the pretrained_model folder of a run of lerobot-train, for example "
-            "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging"
-        )
-    require(
-        arguments.out is not None,
-        "--out is missing; give the folder to write, such as --out=checkpoints/digging",
+    checkpoint = arguments.given(
+        "checkpoint",
+        "the pretrained_model folder of a run of lerobot-train, for example "
+        "lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging",
     )
+    out = arguments.given("out", "the folder to write, such as --out=checkpoints/digging")
     facts = CardFacts(
         title=arguments.title,
         env_type=arguments.env,
         results=arguments.results.read_text() if arguments.results is not None else "",
         license=arguments.license,
     )
-    out = export_checkpoint(arguments.checkpoint, cast(Path, arguments.out), facts)
+    export_checkpoint(checkpoint, out, facts)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0

@@ -71,10 +71,7 @@ def run(arguments: IndexArguments) -> int:
 
 
 def _require_options_with_effect(arguments: IndexArguments) -> None:
-    for option, given in (
-        ("--out", arguments.out is not None),
-        ("--skip_restarted", arguments.skip_restarted),
-    ):
+    for option, given in (("--out", arguments.out is not None), ("--skip_restarted", arguments.skip_restarted)):
         require(not given or arguments.session is not None, f"{option} is of use with --session only")
     require(
         arguments.eval_fraction is None or arguments.split is not None,
@@ -98,7 +95,7 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     versions = episodes_by_version(versions_of(index))
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in index["qc"].value_counts().items())
     lines = [
-        "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in sorted(versions.items())),
+        "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in versions.items()),
         *(_counts(name, index[name]) for name in start_settings(index)),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",

@@ -14,7 +14,6 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
 
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.envs.tasks.setting import setting
@@ -47,17 +46,13 @@ class OperatorArguments(ResumableArguments, PlayedScenes):
 
 def run(arguments: OperatorArguments) -> int:
     """Play, and print a report."""
-    require(
-        arguments.metrics is not None,
-        "--metrics is missing; give the file to write, such as --metrics=outputs/operator.jsonl",
-    )
+    path = arguments.given("metrics", "the file to write, such as --metrics=outputs/operator.jsonl")
     from lerobot_excav.evaluation.metrics import read_evaluation
     from lerobot_excav.evaluation.operator_run import evaluate_operator
     from lerobot_excav.evaluation.report import make_report
     from lerobot_excav.evaluation.report_text import report_text
     from lerobot_excav.evaluation.run import Run
 
-    path = cast(Path, arguments.metrics)
     evaluate_operator(played(PlayedScenes, arguments), path, workers=arguments.workers, resume=arguments.resume)
     operator = Run(label="operator", evaluations=(read_evaluation(path),))
     print(report_text(make_report([operator])))

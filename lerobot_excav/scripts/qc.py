@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from lerobot_excav.envs.tasks.setting import setting
-from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import Arguments
 
 if TYPE_CHECKING:
@@ -39,8 +38,7 @@ class DatasetArguments(Arguments):
         Raises:
             ConfigurationError: None was given.
         """
-        require(self.dataset is not None, "the folder of a dataset is missing; give it before all options")
-        return cast(Path, self.dataset)
+        return cast(Path, self.given("dataset", "its folder before all options"))
 
 
 @dataclass(kw_only=True)

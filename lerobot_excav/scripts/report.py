@@ -55,15 +55,11 @@ def run(arguments: ReportArguments) -> int:
         DatasetError: A metrics file cannot be used.
     """
     require(
-        bool(arguments.metrics) != (arguments.rows is not None),
-        "give either metrics files or --rows, and not both",
+        bool(arguments.metrics) != (arguments.rows is not None), "give either metrics files or --rows, and not both"
     )
     if arguments.rows is not None:
         return _page(arguments)
-    require(
-        arguments.metrics_folder is None,
-        f"--metrics_folder={arguments.metrics_folder} is of use with --rows only",
-    )
+    require(arguments.metrics_folder is None, f"--metrics_folder={arguments.metrics_folder} is of use with --rows only")
     operator = None
     if arguments.operator is not None:
         operator = Run(label="operator", evaluations=(read_evaluation(arguments.operator),))
@@ -95,10 +91,9 @@ def _page(arguments: ReportArguments) -> int:
 
 
 def runs_from(results: list[str]) -> list[Run]:
-    """Read runs in the order of their first mention.
+    """Read runs in the order of their first mention, `[LABEL=]PATH` each.
 
-    Args:
-        results: `[LABEL=]PATH` each; without a label, the name of the file, or of its folder if that says more.
+    Without a label, it is the name of the file, or of its folder if that says more.
 
     Raises:
         ConfigurationError: One file was given twice, or two runs without a label would have the same name.

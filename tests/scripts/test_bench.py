@@ -28,10 +28,7 @@ def test_options_reach_the_measurements(monkeypatch):
     monkeypatch.setattr(speed, "measures", measures)
     main([*TOY, "--only=demos", "--env.table=ice"])
     main(["bench", "--workers=3"])
-    assert [(name, workers) for name, _, workers in asked] == [
-        ("demos", 0),
-        *((name, 3) for name in MEASURES),
-    ]
+    assert [(name, workers) for name, _, workers in asked] == [("demos", 0), *((name, 3) for name in MEASURES)]
     (_, toy, _), (_, excavator, _), *_ = asked
     assert (toy.env.table, toy.scenes, toy.keep_failures) == ("ice", 1, True)
     assert (excavator.env.ENV_TYPE, excavator.scenes) == ("excavator", 3)

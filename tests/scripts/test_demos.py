@@ -49,14 +49,7 @@ def whole(env_type, tmp_path_factory):
 @pytest.mark.slow
 def test_a_killed_run_continues_to_the_same_dataset_with_other_workers(env_type, whole, tmp_path):
     out = tmp_path / "killed"
-    command = [
-        sys.executable,
-        "-m",
-        "lerobot_excav.scripts.main",
-        "demos",
-        *OPTIONS[env_type],
-        f"--out={out}",
-    ]
+    command = [sys.executable, "-m", "lerobot_excav.scripts.main", "demos", *OPTIONS[env_type], f"--out={out}"]
     log = (tmp_path / "log").open("wb")
     run = subprocess.Popen([*command, "--workers=2"], start_new_session=True, stdout=log, stderr=log)
     deadline = time.monotonic() + 600

@@ -47,18 +47,13 @@ def test_an_error_is_one_line_and_exit_code_2(capsys, tmp_path):
     ):
         assert main(["qc", str(folder)]) == 2
         assert capsys.readouterr().err == f"lerobot-excav qc: {problem}\n"
-    for command, missing in (
-        ("qc", "the folder of a dataset"),
-        ("demos", "--out"),
-        ("operator", "--metrics"),
-    ):
+    for command, missing in (("qc", "dataset"), ("demos", "--out"), ("operator", "--metrics")):
         assert main([command]) == 2
         assert f"{missing} is missing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "text"),
-    [(KeyboardInterrupt(), 130, "interrupted"), (DatasetError("damaged"), 2, "damaged")],
+    ("error", "code", "text"), [(KeyboardInterrupt(), 130, "interrupted"), (DatasetError("damaged"), 2, "damaged")]
 )
 def test_ctrl_c_and_errors_of_this_package_have_their_own_codes(monkeypatch, capsys, error, code, text):
     def fail(_):

@@ -14,21 +14,13 @@ OVERLAY = "as overlay"
 FIRST_IMAGE_TOLERANCE = 2
 """Grey levels by which the first pictures of a scene may differ; graphics cards round differently (guess)."""
 
-
 ACTION_MARGIN = 0.1
 """Share of its range by which an action may lie outside of it: `lerobot-rollout` records what the policy asked for, and
 environments clip it. More speaks of another unit (guess)."""
 
 
 def episode_problems(episode: EpisodeTable) -> list[str]:
-    """Describe what is wrong with an episode.
-
-    Args:
-        episode: The episode with all columns of the index, and its frame numbers.
-
-    Returns:
-        Problems, in plain words; empty if there is none.
-    """
+    """Describe in plain words what is wrong with an episode that has all columns of the index and `frame_index`."""
     return [*_number_problems(episode), *_mask_problems(episode)]
 
 
@@ -36,11 +28,7 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
     frames = episode.array("frame_index")
     if not np.array_equal(frames, np.arange(episode.length)):
         yield f"frames are not numbered 0 to {episode.length - 1}"
-    for name, values in (
-        (STATE_KEY, episode.state),
-        ("action", episode.action),
-        (TASK_STATE_KEY, episode.task_state),
-    ):
+    for name, values in ((STATE_KEY, episode.state), ("action", episode.action), (TASK_STATE_KEY, episode.task_state)):
         if not np.isfinite(values).all():
             yield f"{name} is not finite at frame {int(np.argmin(np.isfinite(values).all(axis=1)))}"
     names = episode.spec.action_names
@@ -72,10 +60,7 @@ def _mask_problems(episode: EpisodeTable) -> Iterator[str]:
 
 
 def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:
-    """Compare the starts of the episodes of one scene.
-
-    Args:
-        episodes: Episodes with state, main view and mask.
+    """Compare the starts of the episodes of one scene, which have state, main view and mask.
 
     Returns:
         Problems by episode index: another initial state or view than the scene's first episode, or the mask of

@@ -18,11 +18,7 @@ from lerobot_excav.errors import require
 
 
 def check_dataset(
-    root: Path,
-    *,
-    episodes: Collection[int] | None = None,
-    replays: int = 3,
-    seed: int = 0,
+    root: Path, *, episodes: Collection[int] | None = None, replays: int = 3, seed: int = 0
 ) -> pd.DataFrame:
     """Check a dataset and note the verdicts in its index.
 
@@ -45,10 +41,7 @@ def check_dataset(
     require_columns(spec, info.features)
     wanted = sorted(range(info.total_episodes) if episodes is None else set(episodes))
     unknown = [index for index in wanted if not 0 <= index < info.total_episodes]
-    require(
-        not unknown,
-        f"--episodes names {unknown}; the dataset has episodes 0 to {info.total_episodes - 1}",
-    )
+    require(not unknown, f"--episodes names {unknown}; the dataset has episodes 0 to {info.total_episodes - 1}")
     require(replays >= 0, f"--replays={replays} must not be negative")
 
     index = build_index(root)
@@ -58,10 +51,7 @@ def check_dataset(
     if sample:
         versions = versions_of(index)
         require_this_simulation(
-            spec,
-            {i: versions[i] for i in wanted},
-            source=root,
-            instead="; --replays=0 checks all but replays",
+            spec, {i: versions[i] for i in wanted}, source=root, instead="; --replays=0 checks all but replays"
         )
         for recorded in iterate_episodes(root, index_keys(spec), episodes=sample):
             problem = replay_problem(recorded, fps=info.fps)

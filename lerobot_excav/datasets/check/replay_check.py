@@ -2,34 +2,18 @@
 
 import numpy as np
 
-from lerobot_excav.datasets.complete.resimulation import STATE_TOLERANCE
+from lerobot_excav.datasets.complete.resimulation import STATE_TOLERANCE, state_deviation
 from lerobot_excav.datasets.format.episode_table import EpisodeTable
-from lerobot_excav.datasets.record.episode import replay
-from lerobot_excav.datasets.record.simulation import make_replay_environment
+from lerobot_excav.datasets.record.simulation import play_again
 
 
 def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
-    """Play an episode again and describe how it deviates.
-
-    Args:
-        recorded: The episode with state, action, task state and `excav.*` columns.
-        fps: Frames per second of the dataset.
-
-    Returns:
-        The first deviation beyond tolerance, or an empty string.
-    """
-    spec, pair = recorded.spec, recorded.pair
-    env = make_replay_environment(
-        spec, scene_set=pair.scene_set, fps=fps, columns=recorded.settings, frames=recorded.length
-    )
-    try:
-        played = replay(env, recorded.action, pair, recorded.schedule)
-    finally:
-        env.close()
-    state = np.abs(played.state - recorded.state).max(axis=1)
-    if state.max() > STATE_TOLERANCE:
-        frame = int(np.argmax(state > STATE_TOLERANCE))
-        return f"replay leaves the recorded state at frame {frame} (up to {state.max():.3g} rad)"
+    """Play an episode again; return the first deviation beyond tolerance in words, or an empty text."""
+    spec = recorded.spec
+    played = play_again(spec, recorded.action, recorded.pair, recorded.schedule, fps=fps, columns=recorded.settings)
+    largest, frame = state_deviation(played, recorded)
+    if largest > STATE_TOLERANCE:
+        return f"replay leaves the recorded state at frame {frame} (up to {largest:.3g} rad)"
     task = np.abs(played.task_state - recorded.task_state)
     if task.max() > spec.task_state_tolerance:
         name = spec.task_state_names[int(np.argmax(task.max(axis=0)))]

@@ -58,11 +58,6 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
 def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_restarted: bool) -> list[int]:
     """Return the episodes of a recording in which the scene was not restarted and no mask was waited for.
 
-    Args:
-        session: The session by episode index.
-        total: Number of episodes of the recording.
-        skip_restarted: Whether others may be left out.
-
     Raises:
         DatasetError: There are others that may not be left out, or nothing else.
     """

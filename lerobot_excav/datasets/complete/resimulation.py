@@ -7,7 +7,7 @@ the same state, so states cannot tell them apart: the target is known by its mas
 
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,23 +21,12 @@ from lerobot_excav.datasets.complete.recording_check import (
     whole_episodes,
 )
 from lerobot_excav.datasets.complete.session import SessionEpisode, read_session
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
-from lerobot_excav.datasets.format.schema import (
-    ACTION_KEY,
-    MASK_SOURCE_KEY,
-    PAIR_KEY,
-    SCENE_KEY,
-    SIMULATION_KEY,
-    STATE_KEY,
-    SUCCESS_KEY,
-    TARGET_KEY,
-    TASK_STATE_KEY,
-    excav_features,
-    setting_key,
-)
 from lerobot_excav.datasets.pairs.paired_index import write_index
-from lerobot_excav.datasets.record.episode import Episode, replay
-from lerobot_excav.datasets.record.simulation import make_replay_environment
+from lerobot_excav.datasets.record.assembly import constant_columns
+from lerobot_excav.datasets.record.episode import Episode
+from lerobot_excav.datasets.record.simulation import play_again
 from lerobot_excav.errors import DatasetError
 
 STATE_TOLERANCE = 1e-4
@@ -45,11 +34,7 @@ STATE_TOLERANCE = 1e-4
 
 
 def complete_recording(
-    root: Path,
-    session_path: Path,
-    *,
-    out: Path | None = None,
-    skip_restarted: bool = False,
+    root: Path, session_path: Path, *, out: Path | None = None, skip_restarted: bool = False
 ) -> Path:
     """Add the `excav.*` columns to a recording, and its index.
 
@@ -103,59 +88,44 @@ def _reduced(root: Path, episodes: list[int], copy: Path) -> Iterator[Path]:
 def _resimulate_all(root: Path, session: dict[int, SessionEpisode]) -> dict[int, Episode]:
     return {
         recorded.index: _resimulate(recorded, session[recorded.index])
-        for recorded in iterate_episodes(root, (STATE_KEY, ACTION_KEY))
+        for recorded in iterate_episodes(root, (schema.STATE_KEY, schema.ACTION_KEY))
     }
 
 
 def _resimulate(recorded: EpisodeTable, session: SessionEpisode) -> Episode:
     settings = session.task_settings
-    env = make_replay_environment(
-        recorded.spec,
-        scene_set=settings.scene_set,
-        fps=settings.fps,
-        columns={name: getattr(settings, name) for name in settings.columns()},
-        frames=recorded.length,
+    columns = {name: getattr(settings, name) for name in settings.columns()}
+    played = play_again(
+        recorded.spec, recorded.action, session.pair, session.schedule, fps=settings.fps, columns=columns
     )
-    try:
-        played = replay(env, recorded.action, session.pair, session.schedule)
-    finally:
-        env.close()
-    deviation = np.abs(played.state - recorded.state).max(axis=1)
-    if deviation.max() > STATE_TOLERANCE:
-        frame = int(np.argmax(deviation > STATE_TOLERANCE))
+    largest, frame = state_deviation(played, recorded)
+    if largest > STATE_TOLERANCE:
         raise DatasetError(
             f"episode {recorded.index}: the re-simulation of {session.pair.uid} leaves the recorded state at frame "
-            f"{frame} of {recorded.length} (largest deviation {deviation.max():.3g} rad or rad/s, allowed "
+            f"{frame} of {recorded.length} (largest deviation {largest:.3g} rad or rad/s, allowed "
             f"{STATE_TOLERANCE:g}); is it the session of this recording, and the version that recorded it?"
         )
     return played
 
 
+def state_deviation(played: Episode, recorded: EpisodeTable) -> tuple[float, int]:
+    """Return by how much states differ at most [rad, rad/s], and the first frame where they differ too much, or 0."""
+    deviation = np.abs(played.state - recorded.state).max(axis=1)
+    return float(deviation.max()), int(np.argmax(deviation > STATE_TOLERANCE))
+
+
 def _write_completed(root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
-    spec = read_info(root).spec
-    columns = excav_features(spec)
+    constant = {i: constant_columns(episode, session[i].task_settings) for i, episode in episodes.items()}
+    varying = {schema.TARGET_KEY: "target_id", schema.TASK_STATE_KEY: "task_state"}
 
-    def constant(key: str, values: dict[int, Any]) -> tuple[Any, dict[str, Any]]:
-        return lambda row, episode, frame: values[int(episode)], columns[key]
+    def value(key: str) -> Callable[[Any, Any, Any], Any]:
+        if key in varying:
+            return lambda row, episode, frame: getattr(episodes[int(episode)], varying[key])[int(frame)]
+        return lambda row, episode, frame: constant[int(episode)][key]
 
-    def varying(key: str, name: str) -> tuple[Any, dict[str, Any]]:
-        return lambda row, episode, frame: getattr(episodes[int(episode)], name)[int(frame)], columns[key]
-
-    settings = {i: session[i].task_settings for i in episodes}
-    features = {
-        SCENE_KEY: constant(SCENE_KEY, {i: e.pair.scene_id for i, e in episodes.items()}),
-        TARGET_KEY: varying(TARGET_KEY, "target_id"),
-        PAIR_KEY: constant(PAIR_KEY, {i: e.pair.uid for i, e in episodes.items()}),
-        TASK_STATE_KEY: varying(TASK_STATE_KEY, "task_state"),
-        SUCCESS_KEY: constant(SUCCESS_KEY, {i: e.success for i, e in episodes.items()}),
-        SIMULATION_KEY: constant(SIMULATION_KEY, dict.fromkeys(episodes, spec.simulation_version)),
-        MASK_SOURCE_KEY: constant(MASK_SOURCE_KEY, {i: s.mask_words for i, s in settings.items()}),
-        **{
-            setting_key(name): constant(setting_key(name), {i: getattr(s, name) for i, s in settings.items()})
-            for name in spec.settings.columns()
-        },
-    }
+    columns = schema.excav_features(read_info(root).spec)
+    features = {key: (value(key), feature) for key, feature in columns.items()}
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)
 

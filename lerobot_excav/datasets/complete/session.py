@@ -6,9 +6,8 @@ The file is JSON Lines, one object per episode; `robots.session_log` writes it.
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
-from lerobot_excav.datasets.format.json_lines import Line, read_json_lines
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
 from lerobot_excav.envs.tasks.selection import Schedule, checked_schedule
@@ -58,31 +57,43 @@ class SessionEpisode(BaseModel):
 
 
 def read_session(path: Path) -> dict[int, SessionEpisode]:
-    """Read a session.
+    """Read the episodes of a session, by index; blank lines are left out.
 
-    Args:
-        path: The JSON Lines file.
-
-    Returns:
-        Episodes by index. Of two lines with one index the later counts: the robot repeats a number when an episode
-        was recorded again.
+    Of two lines with one index the later counts: the robot repeats a number when an episode was recorded again.
 
     Raises:
-        DatasetError: The file is missing, or a line is not what it should be: it lacks a field, or has an environment,
-            a setting, a scene or a target that is not possible.
+        DatasetError: The file is missing, or a line is not what it should be: it is no JSON object, lacks a field, or
+            has an environment, a setting, a scene or a target that is not possible. The message names line and field.
     """
-    lines = read_json_lines(path, origin="the robot wrote its session to --robot.session_log")
-    episodes = [_episode(line) for line in lines]
+    try:
+        lines = path.read_text().splitlines()
+    except FileNotFoundError:
+        raise DatasetError(f"{path} does not exist; the robot wrote its session to --robot.session_log") from None
+    episodes = [_episode(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
     return {episode.episode_index: episode for episode in episodes}
 
 
-def _episode(line: Line) -> SessionEpisode:
-    episode = line.read(SessionEpisode, hint="is it a session log of a simulated robot?")
+def _episode(line: str, place: str) -> SessionEpisode:
     try:
+        episode = SessionEpisode.model_validate_json(line)
         _require_playable(episode)
+    except ValidationError as error:
+        problems = "; ".join(map(_in_words, error.errors()))
+        raise DatasetError(f"{place}: {problems}; is it a session log of a simulated robot?") from None
     except ConfigurationError as error:
-        raise DatasetError(f"{line.place}: {error}") from None
+        raise DatasetError(f"{place}: {error}") from None
     return episode
+
+
+def _in_words(problem: Any) -> str:
+    name = ".".join(map(str, problem["loc"]))
+    words = {
+        "missing": f"lacks {name}",
+        "extra_forbidden": f"{name} is not known",
+        "json_invalid": f"not JSON ({problem['msg']}); was its writer interrupted? Remove the line if it is the last",
+        "model_type": "a JSON object is expected",
+    }
+    return words.get(problem["type"], f"{name}={problem['input']!r}: {problem['msg']}")
 
 
 def _require_playable(episode: SessionEpisode) -> None:

@@ -15,20 +15,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.pictures import Pictures, StoredImages, VideoSpan
-from lerobot_excav.datasets.format.schema import (
-    ACTION_KEY,
-    MASK_SOURCE_KEY,
-    PAIR_KEY,
-    SCENE_KEY,
-    SIMULATION_KEY,
-    STATE_KEY,
-    SUCCESS_KEY,
-    TARGET_KEY,
-    TASK_STATE_KEY,
-    setting_key,
-)
 from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -62,37 +51,37 @@ class EpisodeTable:
     @property
     def state(self) -> NDArray[Any]:
         """What was felt of the machine, (n, s)."""
-        return self.array(STATE_KEY)
+        return self.array(schema.STATE_KEY)
 
     @property
     def action(self) -> NDArray[Any]:
         """What the machine was told, (n, a)."""
-        return self.array(ACTION_KEY)
+        return self.array(schema.ACTION_KEY)
 
     @property
     def task_state(self) -> NDArray[Any]:
         """Task state, (n, k)."""
-        return self.array(TASK_STATE_KEY)
+        return self.array(schema.TASK_STATE_KEY)
 
     @property
     def success(self) -> bool:
         """Outcome."""
-        return bool(self._constant(SUCCESS_KEY))
+        return bool(self._constant(schema.SUCCESS_KEY))
 
     @property
     def simulation_version(self) -> int:
         """Version of the simulation that the episode was recorded in."""
-        return int(self._constant(SIMULATION_KEY))
+        return int(self._constant(schema.SIMULATION_KEY))
 
     @property
     def settings(self) -> dict[str, str]:
         """Settings that are kept in every frame, such as the soil, by name."""
-        return {name: str(self._constant(setting_key(name))) for name in self.spec.settings.columns()}
+        return {name: str(self._constant(schema.setting_key(name))) for name in self.spec.settings.columns()}
 
     @property
     def mask_words(self) -> str:
         """What the mask shows, in words."""
-        return str(self._constant(MASK_SOURCE_KEY))
+        return str(self._constant(schema.MASK_SOURCE_KEY))
 
     @property
     def mask_changes(self) -> frozenset[str]:
@@ -102,7 +91,7 @@ class EpisodeTable:
     @property
     def target_id(self) -> NDArray[Any]:
         """Target that is commanded, (n,)."""
-        return self.array(TARGET_KEY)
+        return self.array(schema.TARGET_KEY)
 
     @property
     def schedule(self) -> Schedule:
@@ -118,15 +107,17 @@ class EpisodeTable:
         Raises:
             DatasetError: The columns contradict each other.
         """
-        pair = Pair.parse(self._constant(PAIR_KEY))
-        ids = (self._constant(SCENE_KEY), int(self.target_id[0]))
+        pair = Pair.parse(self._constant(schema.PAIR_KEY))
+        ids = (self._constant(schema.SCENE_KEY), int(self.target_id[0]))
         if pair.env != self.spec.env_type:
             raise DatasetError(
-                f"episode {self.index}: {PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's robot_type is "
-                f"that of {self.spec.env_type!r}"
+                f"episode {self.index}: {schema.PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's "
+                f"robot_type is that of {self.spec.env_type!r}"
             )
         if ids != (pair.scene_id, pair.target_id):
-            raise DatasetError(f"episode {self.index}: scene and first target {ids} contradict {PAIR_KEY}={pair.uid!r}")
+            raise DatasetError(
+                f"episode {self.index}: scene and first target {ids} contradict {schema.PAIR_KEY}={pair.uid!r}"
+            )
         return pair
 
     def first_frame(self) -> "EpisodeTable":
@@ -197,28 +188,14 @@ def read_info(root: Path) -> DatasetInfo:
         raise DatasetError(
             f"{root} has the format {info['codebase_version']}; this needs {CODEBASE_VERSION}, so convert it"
         )
-    return DatasetInfo(
-        fps=info["fps"],
-        total_episodes=info["total_episodes"],
-        features=info["features"],
-        robot_type=info["robot_type"],
-        video_path=info.get("video_path"),
-    )
+    wanted = ("fps", "total_episodes", "features", "robot_type", "video_path")
+    return DatasetInfo(**{name: info.get(name) for name in wanted})
 
 
 def iterate_episodes(
     root: Path, keys: Sequence[str], *, episodes: Collection[int] | None = None
 ) -> Iterator[EpisodeTable]:
-    """Go through a dataset's episodes in the order of their files.
-
-    Args:
-        root: The dataset.
-        keys: Columns to read.
-        episodes: Episode indices; all by default.
-
-    Yields:
-        One table per episode, frames in order.
-    """
+    """Go through a dataset's episodes, all by default, in the order of their files; frames come in order."""
     info = read_info(root)
     wanted = set(range(info.total_episodes) if episodes is None else episodes)
     stored = {kind: [key for key in keys if _dtype(info, key) == kind] for kind in ("image", "video")}
@@ -231,10 +208,7 @@ def iterate_episodes(
                 length=rows.num_rows,
                 spec=info.spec,
                 columns={key: rows[key] for key in columns if key not in stored["image"]},
-                pictures={
-                    **{key: StoredImages(rows[key]) for key in stored["image"]},
-                    **spans.get(index, {}),
-                },
+                pictures={**{key: StoredImages(rows[key]) for key in stored["image"]}, **spans.get(index, {})},
             )
 
 

@@ -7,6 +7,7 @@ are ordinary per-frame columns, the only carrier that survives delete, split, me
 `excav.pair_uid` names the first.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 from lerobot_excav.datasets.format.storage import require_lossless
@@ -38,19 +39,24 @@ def setting_key(name: str) -> str:
 
 def excav_features(spec: TaskSpec) -> dict[str, Feature]:
     """Describe the columns that LeRobot's recorder does not know."""
-    names = list(spec.task_state_names)
+    words = (MASK_SOURCE_KEY, *map(setting_key, spec.settings.columns()))
     return {
-        SCENE_KEY: {"dtype": "int64", "shape": (1,), "names": None},
-        TARGET_KEY: {"dtype": "int64", "shape": (1,), "names": None},
-        PAIR_KEY: {"dtype": "string", "shape": (1,), "names": None},
-        TASK_STATE_KEY: {"dtype": "float32", "shape": (len(names),), "names": names},
-        SUCCESS_KEY: {"dtype": "bool", "shape": (1,), "names": None},
-        SIMULATION_KEY: {"dtype": "int64", "shape": (1,), "names": None},
-        **{
-            key: {"dtype": "string", "shape": (1,), "names": None}
-            for key in (MASK_SOURCE_KEY, *map(setting_key, spec.settings.columns()))
-        },
+        SCENE_KEY: _scalar("int64"),
+        TARGET_KEY: _scalar("int64"),
+        PAIR_KEY: _scalar("string"),
+        TASK_STATE_KEY: _vector(spec.task_state_names),
+        SUCCESS_KEY: _scalar("bool"),
+        SIMULATION_KEY: _scalar("int64"),
+        **{key: _scalar("string") for key in words},
     }
+
+
+def _scalar(dtype: str) -> Feature:
+    return {"dtype": dtype, "shape": (1,), "names": None}
+
+
+def _vector(names: Sequence[str]) -> Feature:
+    return {"dtype": "float32", "shape": (len(names),), "names": list(names)}
 
 
 def dataset_features(spec: TaskSpec, *, height: int, width: int, storage: str = "image") -> dict[str, Feature]:
@@ -61,15 +67,8 @@ def dataset_features(spec: TaskSpec, *, height: int, width: int, storage: str = 
         height: Image height [px].
         width: Image width [px].
         storage: `image` (PNG) or `video`; see `storage`.
-
-    Returns:
-        Feature descriptions by key.
     """
-    action, state = list(spec.action_names), list(spec.state_names)
-    features: dict[str, Feature] = {
-        ACTION_KEY: {"dtype": "float32", "shape": (len(action),), "names": action},
-        STATE_KEY: {"dtype": "float32", "shape": (len(state),), "names": state},
-    }
+    features = {ACTION_KEY: _vector(spec.action_names), STATE_KEY: _vector(spec.state_names)}
     for camera in spec.cameras:
         features[camera_key(camera)] = {
             "dtype": storage,
@@ -83,10 +82,6 @@ def dataset_features(spec: TaskSpec, *, height: int, width: int, storage: str = 
 
 def require_columns(spec: TaskSpec, features: dict[str, Feature]) -> None:
     """Check that a dataset has the columns of this schema with the right types.
-
-    Args:
-        spec: Task of the robot that the dataset was recorded with.
-        features: Feature descriptions of the dataset.
 
     Raises:
         DatasetError: A column is missing or is of another type, or pictures were compressed with losses.

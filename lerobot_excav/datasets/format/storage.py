@@ -21,10 +21,6 @@ LOSSLESS_PIX_FMTS = ("yuv444p", "gbrp")
 def require_lossless(key: str, info: dict[str, Any]) -> None:
     """Check that a video keeps pictures as they were, but for rounding of colours by 2 grey levels.
 
-    Args:
-        key: The video's column.
-        info: What the dataset says of it.
-
     Raises:
         DatasetError: It was compressed with losses, or its settings are unknown.
     """

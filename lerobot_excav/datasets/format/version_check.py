@@ -1,6 +1,5 @@
 """Refusing to replay what another version of the simulation recorded, and to mix versions."""
 
-from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,14 +15,14 @@ def require_this_simulation(spec: TaskSpec, versions: Mapping[int, int], *, sour
     Args:
         spec: Task of the robot that they were recorded with.
         versions: Version of the simulation by episode index.
-        source: The dataset, or the file that names the versions.
+        source: The dataset.
         instead: What can be done without a replay, for the message.
 
     Raises:
         DatasetError: An episode is of another version.
     """
     current = spec.simulation_version
-    for version, episodes in sorted(episodes_by_version(versions).items()):
+    for version, episodes in episodes_by_version(versions).items():
         if version != current:
             newer = max(version, current)
             changes = spec.changes.get(newer, "unknown to this older package")
@@ -37,16 +36,12 @@ def require_this_simulation(spec: TaskSpec, versions: Mapping[int, int], *, sour
 def require_one_version(versions: Mapping[int, int], *, source: Path) -> None:
     """Check that episodes come from one version of the simulation, so that a scene's number means one scene.
 
-    Args:
-        versions: Version of the simulation by episode index.
-        source: The dataset.
-
     Raises:
         DatasetError: They come from several.
     """
     groups = episodes_by_version(versions)
     if len(groups) > 1:
-        found = "; ".join(f"version {v}: {describe_episodes(e)}" for v, e in sorted(groups.items()))
+        found = "; ".join(f"version {v}: {describe_episodes(e)}" for v, e in groups.items())
         raise DatasetError(
             f"{source} mixes versions of the simulation ({found}). A scene's number means another scene in each, so "
             "pairs cannot be told; take the versions apart with `lerobot-edit-dataset --operation.type=split`"
@@ -59,11 +54,8 @@ def versions_of(index: pd.DataFrame) -> dict[int, int]:
 
 
 def episodes_by_version(versions: Mapping[int, int]) -> dict[int, list[int]]:
-    """Group episode indices by version."""
-    groups: dict[int, list[int]] = defaultdict(list)
-    for index, version in sorted(versions.items()):
-        groups[version].append(index)
-    return dict(groups)
+    """Group episode indices by version, both in order."""
+    return {v: [index for index in sorted(versions) if versions[index] == v] for v in sorted(set(versions.values()))}
 
 
 def describe_episodes(episodes: list[int]) -> str:

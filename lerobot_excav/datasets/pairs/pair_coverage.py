@@ -48,14 +48,7 @@ class PairCoverage:
 
 
 def pair_coverage(index: pd.DataFrame) -> PairCoverage:
-    """Examine an index.
-
-    Args:
-        index: A paired-scene index.
-
-    Returns:
-        Counts, missing targets and duplicates.
-    """
+    """Count the scenes of a paired-scene index, and find missing targets and duplicates."""
     targets = set(index["target_id"])
     varied = [name for name in start_settings(index) if index[name].nunique() > 1]
     named = index.assign(

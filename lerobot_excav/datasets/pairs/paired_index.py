@@ -13,21 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
-from lerobot_excav.datasets.format.schema import (
-    ACTION_KEY,
-    MASK_KEY,
-    MASK_SOURCE_KEY,
-    PAIR_KEY,
-    SCENE_KEY,
-    SIMULATION_KEY,
-    STATE_KEY,
-    SUCCESS_KEY,
-    TARGET_KEY,
-    TASK_STATE_KEY,
-    require_columns,
-    setting_key,
-)
 from lerobot_excav.envs.tasks.task import TaskSpec
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
@@ -37,26 +24,11 @@ UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
 
 def index_keys(spec: TaskSpec) -> list[str]:
     """Return the columns of a dataset that its index is derived from."""
-    return [
-        STATE_KEY,
-        ACTION_KEY,
-        MASK_KEY,
-        SCENE_KEY,
-        TARGET_KEY,
-        PAIR_KEY,
-        TASK_STATE_KEY,
-        SUCCESS_KEY,
-        SIMULATION_KEY,
-        MASK_SOURCE_KEY,
-        *(setting_key(name) for name in spec.settings.columns()),
-    ]
+    return [schema.STATE_KEY, schema.ACTION_KEY, schema.MASK_KEY, *schema.excav_features(spec)]
 
 
 def build_index(root: Path) -> pd.DataFrame:
     """Derive the index of a dataset from its columns.
-
-    Args:
-        root: The dataset.
 
     Returns:
         One row per episode, ordered by `episode_index`; columns as in `docs/reference/schema.md`. Verdicts come from
@@ -66,10 +38,10 @@ def build_index(root: Path) -> pd.DataFrame:
         DatasetError: A column is missing, or contradicts another.
     """
     info = read_info(root)
-    require_columns(info.spec, info.features)
+    schema.require_columns(info.spec, info.features)
     rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.spec))]
     index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
-    return _with_verdicts(index, _stored(root))
+    return _with_verdicts(index, root / INDEX_PATH)
 
 
 def write_index(root: Path) -> pd.DataFrame:
@@ -100,7 +72,7 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
         "mask_source": episode.mask_words,
         "length": episode.length,
         "success": episode.success,
-        **_mask_summary(episode.image(MASK_KEY, 0)),
+        **_mask_summary(episode.image(schema.MASK_KEY, 0)),
         **episode.spec.measures.outcome(episode.task_state),
         "fingerprint": fingerprint(episode),
     }
@@ -119,21 +91,15 @@ def _mask_summary(mask_img: NDArray[Any]) -> dict[str, float]:
 
 def fingerprint(episode: EpisodeTable) -> str:
     """Return a digest of what was seen of the joints and commanded, which an edit of the dataset does not change."""
-    digest = hashlib.sha256(episode.columns[PAIR_KEY][0].as_py().encode())
+    digest = hashlib.sha256(episode.columns[schema.PAIR_KEY][0].as_py().encode())
     digest.update(repr(episode.schedule).encode())
     for trace in (episode.state, episode.action):
         digest.update(np.ascontiguousarray(trace, dtype=np.float32).tobytes())
     return digest.hexdigest()[:16]
 
 
-def _stored(root: Path) -> pd.DataFrame | None:
-    path = root / INDEX_PATH
-    return pd.read_parquet(path) if path.is_file() else None
-
-
-def _with_verdicts(index: pd.DataFrame, stored: pd.DataFrame | None) -> pd.DataFrame:
-    if stored is None:
+def _with_verdicts(index: pd.DataFrame, path: Path) -> pd.DataFrame:
+    if not path.is_file():
         return index.assign(qc=UNCHECKED, qc_problem="")
-    known = stored.drop_duplicates("fingerprint").set_index("fingerprint")[["qc", "qc_problem"]]
-    merged = index.join(known, on="fingerprint")
-    return merged.fillna({"qc": UNCHECKED, "qc_problem": ""})
+    known = pd.read_parquet(path).drop_duplicates("fingerprint").set_index("fingerprint")[["qc", "qc_problem"]]
+    return index.join(known, on="fingerprint").fillna({"qc": UNCHECKED, "qc_problem": ""})

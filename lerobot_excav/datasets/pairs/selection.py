@@ -11,12 +11,7 @@ COMPOSITIONS = ("all", "paired", "non-paired", "balanced")
 
 
 def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFrame:
-    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair and soil.
-
-    Args:
-        index: A paired-scene index.
-        include_failures: Whether to keep episodes without success.
-    """
+    """Return the rows worth training on: not failed by the quality check, successful, one episode per pair and soil."""
     rows = index[index["qc"] != FAILED]
     if not include_failures:
         rows = rows[rows["success"]]
@@ -24,12 +19,7 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
 
 
 def select(
-    index: pd.DataFrame,
-    composition: str,
-    *,
-    episodes: int | None = None,
-    scenes: int | None = None,
-    seed: int = 0,
+    index: pd.DataFrame, composition: str, *, episodes: int | None = None, scenes: int | None = None, seed: int = 0
 ) -> pd.DataFrame:
     """Choose a subset of episodes.
 
@@ -88,10 +78,7 @@ def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.
     targets = rows["target_id"].nunique()
     complete = rows.groupby("scene_rank")["target_id"].transform("nunique") == targets
     if episodes is not None:
-        require(
-            episodes % targets == 0,
-            f"--episodes={episodes} is no multiple of the {targets} targets per scene",
-        )
+        require(episodes % targets == 0, f"--episodes={episodes} is no multiple of the {targets} targets per scene")
         scenes = episodes // targets
     ranks = rows[complete]["scene_rank"].drop_duplicates()
     if ranks.empty:
@@ -123,10 +110,8 @@ def _balanced(rows: pd.DataFrame, episodes: int | None) -> pd.DataFrame:
             f"--episodes={episodes} is no multiple of {len(counts)} targets, so it cannot be balanced",
         )
         per_target = episodes // len(counts)
-    groups = [
-        _first(group, per_target, f"episodes with target {target}") for target, group in rows.groupby("target_id")
-    ]
-    return pd.concat(groups)
+    groups = rows.groupby("target_id")
+    return pd.concat([_first(group, per_target, f"episodes with target {target}") for target, group in groups])
 
 
 def _first[Rows: (pd.DataFrame, pd.Series)](rows: Rows, count: int | None, what: str) -> Rows:

@@ -1,6 +1,6 @@
 """Writing finished episodes as a LeRobot dataset, through its public interface."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,50 +11,26 @@ import numpy as np
 from lerobot.configs.video import RGBEncoderConfig
 from lerobot.datasets import LeRobotDataset
 
-from lerobot_excav.datasets.format.schema import (
-    ACTION_KEY,
-    MASK_SOURCE_KEY,
-    PAIR_KEY,
-    SCENE_KEY,
-    SIMULATION_KEY,
-    STATE_KEY,
-    SUCCESS_KEY,
-    TARGET_KEY,
-    TASK_STATE_KEY,
-    camera_key,
-    dataset_features,
-    setting_key,
-)
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.episode import Episode
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.settings import TaskSettings
 
 # Encoding a picture releases the interpreter lock; two threads hide most of it behind the rest (measured).
 IMAGE_THREADS = 2
 
-
 # Every second picture is a key frame: shorter files do not make up for more of them, and longer runs must be decoded to
 # get at one picture (kind: measured, as is the codec: of the lossless ones read alike, it encodes fastest).
-VIDEO_ENCODER = {
-    "vcodec": "h264",
-    "pix_fmt": "yuv444p",
-    "crf": 0,
-    "g": 2,
-    "preset": "veryfast",
-    "fast_decode": 1,
-}
+VIDEO_ENCODER = {"vcodec": "h264", "pix_fmt": "yuv444p", "crf": 0, "g": 2, "preset": "veryfast", "fast_decode": 1}
 # Below the size of any episode, so that each has its own files: without torchcodec LeRobot opens a file for every
 # picture, and that costs the more the longer the file is (measured: 3.5 ms with 400 pictures, 25 ms with 80 000).
 VIDEO_FILE_SIZE_MB = 0.001
 
 
 def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDataset:
-    """Create an empty dataset.
-
-    Args:
-        root: Its folder; must not exist.
-        settings: What will be recorded.
-    """
-    features = dataset_features(
+    """Create an empty dataset in a folder that does not exist yet."""
+    features = schema.dataset_features(
         settings.task_spec,
         height=settings.env.observation_height,
         width=settings.env.observation_width,
@@ -67,15 +43,14 @@ def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDatase
         features=features,
         robot_type=settings.task_spec.robot_type,
         video_backend="pyav",  # never used; looking for a better one prints a page where none is installed
-        **_WRITERS[str(settings.storage)](settings),
+        **_writer(settings),
     )
 
 
-def _image_writer(settings: DemonstrationSettings) -> dict[str, Any]:
-    return {"use_videos": False, "image_writer_threads": IMAGE_THREADS}
-
-
-def _video_writer(settings: DemonstrationSettings) -> dict[str, Any]:
+def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
+    """Return how LeRobot is to write the pictures."""
+    if settings.storage == "image":
+        return {"use_videos": False, "image_writer_threads": IMAGE_THREADS}
     # LeRobot's encoders give libav's messages back to the terminal while others are at work.
     av.logging.set_libav_level(av.logging.ERROR)
     return {
@@ -89,38 +64,33 @@ def _video_writer(settings: DemonstrationSettings) -> dict[str, Any]:
     }
 
 
-_WRITERS: dict[str, Callable[[DemonstrationSettings], dict[str, Any]]] = {
-    "image": _image_writer,
-    "video": _video_writer,
-}
+def constant_columns(episode: Episode, settings: TaskSettings) -> dict[str, Any]:
+    """Return the `excav.*` columns that are the same in every frame of an episode played with these settings."""
+    return {
+        schema.SCENE_KEY: episode.pair.scene_id,
+        schema.PAIR_KEY: episode.pair.uid,
+        schema.SUCCESS_KEY: episode.success,
+        schema.SIMULATION_KEY: task_of_settings(settings).simulation_version,
+        schema.MASK_SOURCE_KEY: settings.mask_words,
+        **{schema.setting_key(name): getattr(settings, name) for name in settings.columns()},
+    }
 
 
 def append_episode(dataset: LeRobotDataset, episode: Episode, settings: DemonstrationSettings) -> None:
-    """Add an episode to a dataset that is being written.
-
-    Args:
-        dataset: The dataset.
-        episode: The episode.
-        settings: What it was played with.
-    """
+    """Add an episode to a dataset that is being written."""
     constant = {
-        SCENE_KEY: np.array([episode.pair.scene_id], dtype=np.int64),
-        PAIR_KEY: episode.pair.uid,
-        SUCCESS_KEY: np.array([episode.success]),
-        SIMULATION_KEY: np.array([settings.task_spec.simulation_version], dtype=np.int64),
-        MASK_SOURCE_KEY: settings.env.mask_words,
-        **{setting_key(name): getattr(settings.env, name) for name in settings.task_spec.settings.columns()},
-        "task": episode.task,
+        key: value if isinstance(value, str) else np.array([value])
+        for key, value in constant_columns(episode, settings.env).items()
     }
     for frame in range(episode.length):
         varying = {
-            STATE_KEY: episode.state[frame],
-            ACTION_KEY: episode.action[frame],
-            TARGET_KEY: episode.target_id[frame : frame + 1],
-            TASK_STATE_KEY: episode.task_state[frame],
+            schema.STATE_KEY: episode.state[frame],
+            schema.ACTION_KEY: episode.action[frame],
+            schema.TARGET_KEY: episode.target_id[frame : frame + 1],
+            schema.TASK_STATE_KEY: episode.task_state[frame],
         }
-        images = {camera_key(camera): frames[frame] for camera, frames in episode.images.items()}
-        dataset.add_frame({**constant, **varying, **images})
+        images = {schema.camera_key(camera): frames[frame] for camera, frames in episode.images.items()}
+        dataset.add_frame({"task": episode.task, **constant, **varying, **images})
     with _without_progress_bars():
         dataset.save_episode()
 

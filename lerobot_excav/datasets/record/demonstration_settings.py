@@ -87,12 +87,7 @@ class PlayedScenes:
             Pair(self.env.ENV_TYPE, scene_set, scene_id, target_id)
             for scene_id in range(self.first_scene, self.first_scene + self.scenes)
             for target_id in targets_of_scene(
-                self.target_rule,
-                self.targets,
-                seed=self.seed,
-                scene_set=scene_set,
-                scene_id=scene_id,
-                nearest=nearest,
+                self.target_rule, self.targets, seed=self.seed, scene_set=scene_set, scene_id=scene_id, nearest=nearest
             )
         ]
 
@@ -119,12 +114,7 @@ class DemonstrationSettings(PlayedScenes):
 
     @classmethod
     def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":
-        """Make settings of an environment named by its `--env.type`.
-
-        Args:
-            env_type: The environment.
-            env: Settings of the environment that differ from the defaults.
-            settings: The other fields that do.
+        """Make settings of an environment named by its `--env.type`; `env` holds those of the environment itself.
 
         Raises:
             ConfigurationError: There is no such environment, or a field is not possible in it.
@@ -145,11 +135,7 @@ class DemonstrationSettings(PlayedScenes):
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], *, source: Path) -> "DemonstrationSettings":
-        """Rebuild settings from `as_record`.
-
-        Args:
-            record: What `as_record` returned.
-            source: Where it was stored, for messages.
+        """Rebuild settings from `as_record`, which was stored in the file `source`.
 
         Raises:
             ConfigurationError: It belongs to another version of the simulation, or a field is missing or unknown.
@@ -171,9 +157,6 @@ class DemonstrationSettings(PlayedScenes):
 
     def require_same(self, other: "DemonstrationSettings") -> None:
         """Check that a started run has these settings.
-
-        Args:
-            other: Settings of the started run.
 
         Raises:
             ConfigurationError: A field differs.

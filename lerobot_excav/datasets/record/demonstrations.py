@@ -46,12 +46,7 @@ class DemonstrationSummary:
 
 
 def record_demonstrations(
-    settings: DemonstrationSettings,
-    out: Path,
-    *,
-    workers: int = 2,
-    resume: bool = False,
-    show_progress: bool = True,
+    settings: DemonstrationSettings, out: Path, *, workers: int = 2, resume: bool = False, show_progress: bool = True
 ) -> DemonstrationSummary:
     """Record scripted demonstrations as a LeRobot dataset.
 
@@ -124,11 +119,7 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
 
 
 def _start(
-    pool: Executor,
-    progress: EpisodeProgress,
-    settings: DemonstrationSettings,
-    pair: Pair,
-    folder: Path,
+    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, pair: Pair, folder: Path
 ) -> Future[Outcome]:
     """Submit an episode, unless it is finished already."""
     finished = EpisodeStore(folder).outcome(pair)

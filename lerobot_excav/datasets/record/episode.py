@@ -48,13 +48,7 @@ class Episode:
 
 
 def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) -> Episode:
-    """Let an operator play an episode to its end.
-
-    Args:
-        env: Environment; it is reset to the pair's scene and target.
-        operator: Operator; it is reset once the environment is.
-        pair: Scene and target.
-    """
+    """Reset an environment to a pair's scene and target, then the operator, and let it play to the end."""
     options = {"scene_id": pair.scene_id, "target_id": pair.target_id}
     return _play(env, pair, options, reset=lambda: operator.reset(env), act=lambda _: operator.act(env))
 

@@ -21,27 +21,18 @@ from lerobot_excav.datasets.record.episode import Episode
 PNG_LEVEL = 1
 
 
-class EpisodeStore:
-    """A folder of finished episodes.
+TRACES = ("state", "action", "target_id", "task_state")
 
-    Args:
-        folder: Where they lie; created if missing.
-    """
+
+class EpisodeStore:
+    """A folder of finished episodes; it is made if it is missing."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, episode: Episode, *, keep_frames: bool) -> dict[str, Any]:
-        """Write a finished episode.
-
-        Args:
-            episode: The episode.
-            keep_frames: Whether its frames are wanted, or only its outcome.
-
-        Returns:
-            The outcome that was written: success, frame count, whether frames were kept, and metrics.
-        """
+        """Write a finished episode, with its frames or without; return the outcome that was written."""
         outcome = {
             "pair_uid": episode.pair.uid,
             "success": episode.success,
@@ -74,10 +65,7 @@ class EpisodeStore:
             pair=pair,
             task=str(arrays["task"]),
             images={camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras},
-            state=arrays["state"],
-            action=arrays["action"],
-            target_id=arrays["target_id"],
-            task_state=arrays["task_state"],
+            **{name: arrays[name] for name in TRACES},
             success=bool(outcome["success"]),
             mask_missing_frames=outcome["mask_missing_frames"],
             metrics=outcome["metrics"],
@@ -88,13 +76,7 @@ class EpisodeStore:
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
-    arrays = {
-        "task": np.array(episode.task),
-        "state": episode.state,
-        "action": episode.action,
-        "target_id": episode.target_id,
-        "task_state": episode.task_state,
-    }
+    arrays = {"task": np.array(episode.task), **{name: getattr(episode, name) for name in TRACES}}
     for camera, frames in episode.images.items():
         arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
     return arrays
@@ -111,10 +93,8 @@ def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _decode(data: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
-    starts = np.concatenate([[0], ends[:-1]])
-    return np.stack(
-        [np.asarray(Image.open(io.BytesIO(data[a:b].tobytes()))) for a, b in zip(starts, ends, strict=True)]
-    )
+    pictures = np.split(data, ends[:-1])
+    return np.stack([np.asarray(Image.open(io.BytesIO(picture.tobytes()))) for picture in pictures])
 
 
 def _replace(path: Path, data: bytes | memoryview) -> None:

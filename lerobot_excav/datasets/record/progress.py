@@ -1,19 +1,13 @@
 """A progress bar that counts episodes and tells their rate."""
 
 import time
-from types import TracebackType
 from typing import Any
 
 from tqdm import tqdm
 
 
 class EpisodeProgress:
-    """Counts finished episodes on a bar.
-
-    Args:
-        total: Number of episodes.
-        show: Whether to draw the bar.
-    """
+    """Counts finished episodes on a bar, unless it is not to be shown."""
 
     def __init__(self, total: int, *, show: bool) -> None:
         self._bar: tqdm[Any] = tqdm(
@@ -29,9 +23,7 @@ class EpisodeProgress:
     def __enter__(self) -> "EpisodeProgress":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._bar.close()
 
     def count(self, *, success: bool) -> None:

@@ -58,6 +58,5 @@ def read_provenance(root: Path) -> Provenance:
             f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"
         ) from None
     return Provenance(
-        settings=DemonstrationSettings.from_record(record["settings"], source=path),
-        outcomes=record["episodes"],
+        settings=DemonstrationSettings.from_record(record["settings"], source=path), outcomes=record["episodes"]
     )

@@ -4,32 +4,26 @@ Workers load this module and what it imports; LeRobot, which takes seconds and a
 """
 
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
-from lerobot_excav.datasets.record.episode import Episode, demonstrate
+from lerobot_excav.datasets.record.episode import Episode, demonstrate, replay
 from lerobot_excav.datasets.record.episode_store import EpisodeStore
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
 
 def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> dict[str, Any]:
-    """Play one episode and store it; runs in a worker.
-
-    Args:
-        settings: What is being recorded.
-        pair: Scene and target.
-        folder: Folder of finished episodes.
-
-    Returns:
-        Outcome of the episode.
-    """
+    """Play one episode, store it in the folder of finished ones, and return its outcome; runs in a worker."""
     episode = play_demonstration(settings, pair)
     # An episode that waited for its mask has frames that no action led to: it could not be played again.
     keep = (episode.success or settings.keep_failures) and episode.mask_missing_frames == 0
@@ -39,12 +33,7 @@ def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) 
 def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = True) -> Episode:
     """Play one episode with the scripted operator; the same arguments give the same episode.
 
-    The environment stays open for the next call with the same settings.
-
-    Args:
-        played: What is played.
-        pair: Scene and target.
-        with_images: Whether the environment draws pictures; without them it is several times faster.
+    The environment stays open for the next call with the same settings. Without pictures it is several times faster.
     """
     env = _open_environment(played.env, with_images=with_images)
     operator = played.task_spec.make_operator(np.random.default_rng(played.episode_seed(pair)))
@@ -61,20 +50,23 @@ def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTask
     return env
 
 
-def make_replay_environment(
-    spec: TaskSpec, *, scene_set: str, fps: int, columns: Mapping[str, str], frames: int
-) -> MaskedTaskEnv[Any, Any]:
-    """Make the environment in which a recorded episode is played again, without pictures and with its own commands.
+def play_again(
+    spec: TaskSpec, action: NDArray[Any], pair: Pair, schedule: Schedule, *, fps: int, columns: Mapping[str, str]
+) -> Episode:
+    """Play the recorded actions of an episode (n, a) again, without pictures and with its own commands.
 
     Args:
         spec: The task.
-        scene_set: Scene set.
+        action: Actions.
+        pair: Scene and first target.
+        schedule: Changes of the command.
         fps: Frames per second.
         columns: Settings that datasets keep in every frame, by name.
-        frames: Length of the recording.
     """
-    settings = spec.make_settings(scene_set=scene_set, fps=fps, episode_length=spec.replay_length(frames), **columns)
-    return make_environment(settings, with_images=False)
+    length = spec.replay_length(len(action))
+    settings = spec.make_settings(scene_set=pair.scene_set, fps=fps, episode_length=length, **columns)
+    with closing(make_environment(settings, with_images=False)) as env:
+        return replay(env, action, pair, schedule)
 
 
 _open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []

@@ -14,13 +14,7 @@ _STREAM = 0x7A26
 
 
 def targets_of_scene(
-    rule: str,
-    count: int,
-    *,
-    seed: int,
-    scene_set: str,
-    scene_id: int,
-    nearest: Callable[[str, int], int],
+    rule: str, count: int, *, seed: int, scene_set: str, scene_id: int, nearest: Callable[[str, int], int]
 ) -> list[int]:
     """Return the targets that a scene is shown with.
 

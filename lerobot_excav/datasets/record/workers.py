@@ -17,7 +17,6 @@ from lerobot_excav.errors import ExcavError, require_integer
 # Every worker is one simulation; libraries that start threads of their own would only fight over the cores.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS"), "1")
 
-
 MOST_WORKERS = 1024
 
 
@@ -64,14 +63,7 @@ def worker_pool(workers: int) -> Iterator[Executor]:
 def submit_episode(
     pool: Executor, progress: EpisodeProgress, play: Callable[..., dict[str, Any]], *arguments: Any
 ) -> Future[dict[str, Any]]:
-    """Submit an episode to a pool, to be counted when it is done.
-
-    Args:
-        pool: Where it is played.
-        progress: Counts it.
-        play: Plays it and returns its outcome, which has an entry `success`.
-        arguments: Arguments of `play`.
-    """
+    """Submit an episode to a pool, to be counted when done; `play` returns its outcome with an entry `success`."""
 
     def count(future: Future[dict[str, Any]]) -> None:
         if not future.cancelled() and future.exception() is None:

@@ -8,10 +8,8 @@ from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
-from lerobot_excav.teleoperators.excavator_joystick.mapping import PressDetector, joint_commands
+from lerobot_excav.teleoperators.excavator_joystick.mapping import joint_commands
 from lerobot_excav.teleoperators.simulation_teleoperator import SimulationTeleoperator
-
-OpenDevice = Callable[[ExcavatorJoystickConfig], Gamepad]
 
 
 class ExcavatorJoystick(SimulationTeleoperator):
@@ -30,13 +28,13 @@ class ExcavatorJoystick(SimulationTeleoperator):
         self,
         config: ExcavatorJoystickConfig,
         *,
-        open_device: OpenDevice = open_gamepad,
+        open_device: Callable[[ExcavatorJoystickConfig], Gamepad] = open_gamepad,
     ) -> None:
         super().__init__(config)
         self.config = config
         self._open_device = open_device
         self._device: Gamepad | None = None
-        self._presses = PressDetector()
+        self._was_down: dict[str, bool] = {}
 
     @property
     def is_connected(self) -> bool:
@@ -53,7 +51,7 @@ class ExcavatorJoystick(SimulationTeleoperator):
         if self._device is not None:
             raise DeviceError(f"the gamepad {self._device.name!r} is connected already; call disconnect() first.")
         self._device = self._open_device(self.config)
-        self._presses = PressDetector()
+        self._was_down = {}
 
     def get_action(self) -> dict[str, float]:
         """Return the commands of the four joints, and a key for each button that was just pressed.
@@ -67,8 +65,10 @@ class ExcavatorJoystick(SimulationTeleoperator):
         response = {name: getattr(self.config, name) for name in ("pattern", "dead_zone", "expo", "invert")}
         action = dict(zip(ACTION_NAMES, joint_commands(axes, **response).values(), strict=True))
         for button, key in zip(self.config.buttons, (REINITIALISE, NEXT_SCENE), strict=True):
-            if self._presses.pressed(button, is_down=buttons[button]):
+            # A button that is down when the device is first read is held, not pressed.
+            if buttons[button] and not self._was_down.get(button, True):
                 action[key] = 1.0
+        self._was_down = buttons
         return action
 
     def disconnect(self) -> None:

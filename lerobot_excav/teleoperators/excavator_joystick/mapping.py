@@ -57,19 +57,3 @@ def joint_commands(
         value = sign * respond(axes[axis], dead_zone=dead_zone, expo=expo)
         commands[joint] = (-value if axis in invert else value) + 0.0  # no negative zero
     return commands
-
-
-class PressDetector:
-    """Report each press of a button once, however long it is held."""
-
-    def __init__(self) -> None:
-        self._was_down: dict[str, bool] = {}
-
-    def pressed(self, button: str, *, is_down: bool) -> bool:
-        """Return whether the button went down since the last call for it.
-
-        A button that is down at its first call counts as held, not pressed.
-        """
-        was_down = self._was_down.get(button, is_down)
-        self._was_down[button] = is_down
-        return is_down and not was_down

@@ -136,7 +136,7 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"restarts": None}, "restarts=None: Input should be a valid list"),
+        ({"restarts": None}, "restarts=None: Input should be a valid array"),
         ({"restarts": [-1]}, r"restarts\.0=-1: .*greater than or equal to 0"),
         ({"commands": [[0, 9]]}, "commands: target_id=9 .*from 0 to 3"),
         ({"commands": [[1, 2]]}, r"commands=\[\[1, 2\]\] .*it begins with \[0, first target\]"),
@@ -158,11 +158,20 @@ def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed
         read_session(session({1: changes}))
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ('{"episode_index": 0}', "lacks simulation_v")])
-def test_a_damaged_session_names_the_line(tmp_path, text, message):
-    (tmp_path / "s.jsonl").write_text(text)
-    with pytest.raises(DatasetError, match=rf"s\.jsonl:1: {message}"):
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "not JSON .* Remove the line if it is the last"),
+        ("[3]", "a JSON object is expected"),
+        ('{"episode_index": 0}', "lacks simulation_version; lacks env;"),
+    ],
+)
+def test_a_damaged_or_missing_session_is_named(tmp_path, text, message):
+    (tmp_path / "s.jsonl").write_text(f"\n{text}")
+    with pytest.raises(DatasetError, match=rf"s\.jsonl:2: {message}"):
         read_session(tmp_path / "s.jsonl")
+    with pytest.raises(DatasetError, match=r"none does not exist; .* --robot\.session_log"):
+        read_session(tmp_path / "none")
 
 
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):

@@ -17,10 +17,7 @@ from .test_selection import index_of, pair_sets
 
 
 @given(
-    pairs=pair_sets,
-    fraction=st.floats(0.0, 0.9),
-    seed=st.integers(0, 5),
-    unit=st.sampled_from(["scene", "episode"]),
+    pairs=pair_sets, fraction=st.floats(0.0, 0.9), seed=st.integers(0, 5), unit=st.sampled_from(["scene", "episode"])
 )
 def test_parts_are_disjoint_complete_and_share_no_scene_when_split_by_scene(pairs, fraction, seed, unit):
     index = index_of(pairs)

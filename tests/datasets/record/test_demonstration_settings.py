@@ -53,24 +53,14 @@ def test_the_nearest_target_is_that_of_the_scene(env_type):
 @pytest.mark.parametrize(
     ("env_type", "env", "settings", "message"),
     [
-        (
-            "excavator",
-            {},
-            {"targets": 1, "target_rule": "nearest"},
-            "--target_rule=nearest has no meaning for",
-        ),
+        ("excavator", {}, {"targets": 1, "target_rule": "nearest"}, "--target_rule=nearest has no meaning for"),
         ("excavator", {}, {"targets": 2, "target_rule": "uniform"}, "--target_rule=uniform chooses a single"),
         ("excavator", {"soil": PRESETS["sand"]}, {}, "cannot be kept in a dataset; give it by name"),
         ("fr5_grasp", {"soil": "sand"}, {}, "--env.soil is not a setting of fr5_grasp"),
         ("fr5_grasp", {"task": "Scoop-v0"}, {}, "task='Scoop-v0' is not known; allowed: 'FR5Grasp-v0'"),
         ("lathe", {}, {}, "--env.type='lathe' is not known; allowed: 'excavator', 'fr5_grasp'"),
         ("fr5_grasp", {}, {"colour": 3}, "option='--colour' is not known; allowed: '--first_scene'"),
-        (
-            "fr5_grasp",
-            {},
-            {"first_scene": 2**31 - 3, "scenes": 5},
-            "--scenes=5 from --first_scene=2147483645",
-        ),
+        ("fr5_grasp", {}, {"first_scene": 2**31 - 3, "scenes": 5}, "--scenes=5 from --first_scene=2147483645"),
         ("toy_reach", {"episode_length": 2**31 - 1}, {}, "--env.episode_length=2147483647 is too long"),
     ],
 )
@@ -79,20 +69,13 @@ def test_what_makes_no_sense_in_an_environment_is_refused(env_type, env, setting
         make(env_type, env, **settings)
 
 
-def test_defaults_are_those_of_the_environment():
-    arm, excavator = make("fr5_grasp"), make("excavator")
-    assert (arm.task_spec.id, arm.env.fps, arm.episode_length, arm.storage) == (
-        "FR5Grasp-v0",
-        50,
-        400,
-        "video",
-    )
-    assert (excavator.env.soil, excavator.episode_length, excavator.storage) == ("sand", 200, "image")
-
-
-@pytest.mark.parametrize(("env_type", "fps", "frames"), [("fr5_grasp", 25, 200), ("excavator", 5, 100)])
-def test_an_episode_lasts_as_long_at_another_frame_rate(env_type, fps, frames):
-    assert make(env_type, {"fps": fps}).episode_length == frames
+@pytest.mark.parametrize(
+    ("env_type", "fps", "frames", "storage"),
+    [("fr5_grasp", 50, 400, "video"), ("fr5_grasp", 25, 200, "video"), ("excavator", 5, 100, "image")],
+)
+def test_length_and_storage_suit_the_environment_and_its_frame_rate(env_type, fps, frames, storage):
+    settings = make(env_type, {"fps": fps})
+    assert (settings.episode_length, settings.storage) == (frames, storage)
     assert make(env_type, {"fps": fps, "episode_length": 7}).episode_length == 7
 
 

@@ -74,21 +74,14 @@ def test_failed_episodes_are_listed_and_kept_on_request_only(tmp_path, keep):
     summary = record_toy(tmp_path / "d", first_scene=3, scenes=1, keep_failures=keep)
     assert summary.episodes == 3 + keep
     assert summary.failures == ["toy_reach/train/3/1"]
-    assert [outcome["kept"] for outcome in read_provenance(tmp_path / "d").outcomes] == [
-        True,
-        keep,
-        True,
-        True,
-    ]
+    assert [outcome["kept"] for outcome in read_provenance(tmp_path / "d").outcomes] == [True, keep, True, True]
     assert build_index(tmp_path / "d")["success"].tolist() == [True, *[False] * keep, True, True]
 
 
 def test_an_episode_whose_mask_is_missing_is_never_kept(tmp_path, monkeypatch):
     true_mask = toy_reach.env.ReachEnv.true_mask
     monkeypatch.setattr(
-        toy_reach.env.ReachEnv,
-        "true_mask",
-        lambda env, command: true_mask(env, command) & (command.target_id != 2),
+        toy_reach.env.ReachEnv, "true_mask", lambda env, command: true_mask(env, command) & (command.target_id != 2)
     )
     summary = record_toy(tmp_path / "d", scenes=1, keep_failures=True)
     assert (summary.episodes, summary.failures) == (3, ["toy_reach/train/0/2"])

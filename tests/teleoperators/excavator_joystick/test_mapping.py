@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PressDetector, joint_commands, respond
+from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, joint_commands, respond
 
 deflections = st.floats(-1.5, 1.5)
 dead_zones = st.floats(0.0, 0.9)
@@ -57,15 +57,3 @@ def test_each_axis_drives_one_joint_and_centred_sticks_give_plain_zeros(pattern,
         command = joint_commands(CENTRED | {axis: 1.0}, invert=invert, **settings)
         assert command == dict.fromkeys(command, 0.0) | {joint: float(turned)}
         assert str(joint_commands(CENTRED, invert=invert, **settings)) == still
-
-
-@pytest.mark.parametrize(
-    ("downs", "presses"),
-    [
-        ((False, True, True, False, True), [False, True, False, False, True]),
-        ((True, False, True), [False, False, True]),  # held from the start
-    ],
-)
-def test_a_held_button_is_one_press(downs, presses):
-    detector = PressDetector()
-    assert [detector.pressed("a", is_down=down) for down in downs] == presses
