@@ -123,7 +123,7 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
         ({"settings": {"observation_height": 64}}, r"episode 1 does not show the target mask"),
         ({"settings": {"table": "ice"}}, r"episode 1: the re-simulation of .* at frame 1"),
         ({"simulation_version": 7}, r"episodes 1 of version 7 of the simulation cannot be replayed"),
-        ({"restarts": [3]}, r"restarted within episode 1 at frame \[3\], .* --skip_restarted"),
+        ({"restarts": [3]}, r"restarted, .* within episode 1 at frame \[3\], .* --skip_restarted"),
         ({"episode_index": 99}, r"no line for episodes \[1\]"),
         ({"env": "fr5_grasp", "settings": {}}, "episode 1: the session is of fr5_grasp, the recording of toy_reach"),
     ],
