@@ -46,10 +46,7 @@ class Report:
 def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) -> Report:
     """Summarise runs and compare each with the first; a run of another world has other scenes and is not compared.
 
-    Args:
-        runs: At least one run.
-        operator: The operator's run, on at least the same scenes and targets.
-        seed: Seed of the bootstrap.
+    The operator's run is on at least the same scenes and targets; `seed` is that of the bootstrap.
 
     Raises:
         DatasetError: Runs are of different tasks, those of one world show different scenes or targets, or the

@@ -11,13 +11,7 @@ from lerobot_excav.errors import DatasetError, ExcavError
 def validated[Model: BaseModel](
     model: type[Model], text: str, place: str, *, error: type[ExcavError] = DatasetError
 ) -> Model:
-    """Make a model of JSON.
-
-    Args:
-        model: What is expected.
-        text: The JSON.
-        place: Where it stands, for messages, as `FILE:LINE`.
-        error: What to raise.
+    """Make a model of JSON that stands in a place, such as `FILE:LINE`.
 
     Raises:
         ExcavError: Of the type `error`: the text is not JSON, or not what the model expects.

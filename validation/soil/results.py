@@ -29,15 +29,9 @@ class Check:
             return math.inf
         return max(self.low - self.value, self.value - self.high, 0.0)
 
-    @property
-    def value_text(self) -> str:
-        """The value with its unit."""
-        return f"{number_text(self.value)} {self.unit}".rstrip()
-
-    @property
-    def missed_text(self) -> str:
-        """The distance to the gate with its unit."""
-        return f"{number_text(self.missed_by)} {self.unit}".rstrip()
+    def text(self, number: float) -> str:
+        """Return a number with the unit."""
+        return f"{number_text(number)} {self.unit}".rstrip()
 
     @property
     def gate_text(self) -> str:

@@ -10,7 +10,7 @@ from validation.soil.plots import Plot, Series
 from validation.soil.report import report_text, summary_text, write_report
 from validation.soil.results import Check, Result, Table
 
-DOCS = Path(__file__).parents[3] / "docs"
+REPORT = Path(__file__).parents[3] / "docs" / "explanation" / "soil_validation.md"
 
 CURVES = (
     Series("law", (1.0, 2.0), (1.0, 2.0), style="line"),
@@ -75,9 +75,9 @@ def test_conditions_that_cannot_be_are_refused(field, value):
 
 
 def test_the_report_of_the_repository_has_every_experiment_and_picture():
-    text = (DOCS / "soil_validation.md").read_text()
+    text = REPORT.read_text()
     for one in EXPERIMENTS:
         assert f"## {one.code} {one.title}" in text
     for picture in re.findall(r"!\[.*?\]\((.*?)\)", text):
-        assert (DOCS / picture).is_file()
+        assert (REPORT.parent / picture).is_file()
     assert "quick" not in text.split("##")[0]
