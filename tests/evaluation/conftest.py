@@ -33,17 +33,14 @@ def line(task, number, /, **changes):
     return {**place, **SHARED, "shown_target_id": target, **task, **grasped, **changes}
 
 
-scoop, grasp = partial(line, SCOOP), partial(line, GRASP)
-
-
 @pytest.fixture
 def scoop_line():
-    return scoop
+    return partial(line, SCOOP)
 
 
 @pytest.fixture
 def grasp_line():
-    return grasp
+    return partial(line, GRASP)
 
 
 @pytest.fixture
