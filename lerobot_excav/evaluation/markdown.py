@@ -25,11 +25,7 @@ def templates(loader: "BaseLoader") -> "Environment":
     from jinja2 import Environment, StrictUndefined
 
     return Environment(
-        loader=loader,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
+        loader=loader, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
     )
 
 

@@ -6,8 +6,7 @@ from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from validation.soil.blade_force import DEPTHS_M, THEORIES_N, WIDTH_M, blade_sand
 from validation.soil.experiment import Conditions, experiment
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 FRICTION_DEG, STEEL_DEG = 39.0, 26.0
 

@@ -9,8 +9,7 @@ from lerobot_excav.envs.soil import Soil
 from validation import Array
 from validation.soil.arrangement import cylinder
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 HEIGHTS_M = (0.25, 0.5, 1.0, 2.0)
 

@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from validation.soil.plots import Plot
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,31 @@ class Table(NamedTuple):
 
     header: tuple[str, ...]
     rows: tuple[tuple[float | str, ...], ...]
+
+
+class Series(NamedTuple):
+    """One series of values: points, a curve, or a band between `y` and `y_high`.
+
+    Series of one `color` look alike, such as theory and measurement of one thing; None takes the next colour.
+    """
+
+    label: str
+    x: ArrayLike
+    y: ArrayLike
+    style: Literal["line", "dashed", "points"] = "points"
+    y_high: ArrayLike | None = None
+    color: int | None = None
+
+
+class Plot(NamedTuple):
+    """One picture of the report; `name` is that of its file, without ending."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Series, ...]
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,9 +6,8 @@ import pytest
 from lerobot_excav.errors import ConfigurationError
 from validation.soil.catalogue import EXPERIMENTS, chosen
 from validation.soil.experiment import Conditions, SoilExperiment
-from validation.soil.plots import Plot, Series
 from validation.soil.report import report_text, summary_text, write_report
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 REPORT = Path(__file__).parents[3] / "docs" / "explanation" / "soil_validation.md"
 
