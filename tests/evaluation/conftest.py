@@ -33,14 +33,17 @@ def line(task, number, /, **changes):
     return {**place, **SHARED, "shown_target_id": target, **task, **grasped, **changes}
 
 
+scoop, grasp = partial(line, SCOOP), partial(line, GRASP)
+
+
 @pytest.fixture
 def scoop_line():
-    return partial(line, SCOOP)
+    return scoop
 
 
 @pytest.fixture
 def grasp_line():
-    return partial(line, GRASP)
+    return grasp
 
 
 @pytest.fixture

@@ -9,9 +9,8 @@ in which LeRobot counts: line `i` of an evaluation is `per_episode[i]` of its `e
 All but the first two entries are the environment's `episode_metrics`. A number that does not exist, such as
 the time of a loading that never began, is `null`.
 
-LeRobot runs whole batches: with `--eval.n_episodes=5 --eval.batch_size=3` it runs six episodes and drops
-the last. `episode_ix` tells them apart, and `max_episodes` leaves them out. Every evaluation of a training
-run appends, and starts again at `episode_ix` 0.
+LeRobot runs whole batches, and drops the episodes beyond those asked for. `episode_ix` tells them apart, and
+`max_episodes` leaves them out. Every evaluation of a training run appends, and starts again at `episode_ix` 0.
 """
 
 import json
@@ -95,7 +94,7 @@ class MetricsLog:
 
 
 def json_line(record: Mapping[str, Any]) -> str:
-    """Return a record as a line of JSON: NumPy scalars as Python's own, and numbers that JSON lacks as null."""
+    """Return a record as a line of JSON."""
     return json.dumps({key: _plain(value) for key, value in record.items()}, allow_nan=False) + "\n"
 
 
