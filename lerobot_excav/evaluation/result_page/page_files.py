@@ -60,11 +60,9 @@ def _copy_metrics(run: Run, copy: Path, origin: EvaluationOrigin) -> Path:
 
 
 def _pictures(page: ResultPage, folder: Path) -> list[Path]:
-    written = []
+    clips = grid_clips(page)
     if page.curves:
         plot_curves(page.curves, folder / CURVE_PLOT)
-        written.append(folder / CURVE_PLOT)
-    if clips := grid_clips(page):
+    if clips:
         write_grid(folder / VIDEO_GRID, clips)
-        written.append(folder / VIDEO_GRID)
-    return written
+    return [folder / name for name, shown in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if shown]
