@@ -7,16 +7,11 @@ import sys
 
 import pytest
 from lerobot.policies.factory import get_policy_class
-from lerobot.robots import make_robot_from_config
-from lerobot.teleoperators import make_teleoperator_from_config
+from lerobot.robots import RobotConfig, make_robot_from_config
+from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
 
 from lerobot_excav import plugin
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
-from lerobot_excav.robots.excavator_sim.excavator_sim import ExcavatorSim
-from lerobot_excav.robots.fr5_sim.fr5_sim import FR5Sim
-from lerobot_excav.teleoperators.excavator_joystick.excavator_joystick import ExcavatorJoystick
-from lerobot_excav.teleoperators.excavator_operator.excavator_operator import ExcavatorOperator
-from lerobot_excav.teleoperators.fr5_operator.fr5_operator import FR5Operator
 
 ROBOT = ["--robot.type=excavator_sim", "--robot.fps=7"]
 ENV = ["--env.type=excavator", "--env.fps=7"]
@@ -81,19 +76,14 @@ def test_a_command_discovers_the_plugin_and_loads_no_simulator(outputs, command)
     assert not [name for name in modules if name.endswith((".env", ".machine", ".workcell", ".operator"))]
 
 
-@pytest.mark.parametrize(
-    ("make", "config", "device"),
-    [
-        (make_robot_from_config, plugin.ExcavatorSimConfig, ExcavatorSim),
-        (make_teleoperator_from_config, plugin.ExcavatorJoystickConfig, ExcavatorJoystick),
-        (make_teleoperator_from_config, plugin.ExcavatorOperatorConfig, ExcavatorOperator),
-        (make_robot_from_config, plugin.FR5SimConfig, FR5Sim),
-        (make_teleoperator_from_config, plugin.FR5OperatorConfig, FR5Operator),
-    ],
-)
-def test_lerobot_finds_the_class_of_a_device(make, config, device, tmp_path):
+CONFIGS = [getattr(plugin, name) for name in plugin.__all__]
+
+
+@pytest.mark.parametrize("config", [c for c in CONFIGS if issubclass(c, RobotConfig | TeleoperatorConfig)])
+def test_lerobot_finds_the_class_of_a_device(config, tmp_path):
+    make = make_robot_from_config if issubclass(config, RobotConfig) else make_teleoperator_from_config
     made = make(config(calibration_dir=tmp_path))
-    assert isinstance(made, device)
+    assert f"{type(made).__name__}Config" == config.__name__
     assert made.name == made.config.type
 
 
@@ -102,7 +92,6 @@ def test_lerobot_finds_the_class_of_the_policy():
 
 
 def test_the_list_is_complete():
-    assert all(hasattr(plugin, name) for name in plugin.__all__)
-    registered = {getattr(plugin, name).get_choice_name(getattr(plugin, name)) for name in plugin.__all__}
+    registered = {config.get_choice_name(config) for config in CONFIGS}
     excavator = {"excavator", "excavator_sim", "excavator_joystick", "excavator_operator"}
     assert registered == {*excavator, "fr5_grasp", "fr5_sim", "fr5_operator", "mask_act"}

@@ -1,7 +1,6 @@
 """Markdown of reports: the templates of this package, and tables that read as plain text, too."""
 
 from collections.abc import Sequence
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from lerobot_excav.envs.tasks.measures import Column
@@ -10,29 +9,23 @@ from lerobot_excav.evaluation.run_summary import RateOf, Value
 from lerobot_excav.evaluation.statistics import Interval
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import BaseLoader, Environment
 
 
 def render(template: str, **values: Any) -> str:
-    """Fill a template.
+    """Fill `templates/TEMPLATE.md.jinja` with values by their names; `table(header, rows)` is there as well."""
+    from jinja2 import PackageLoader
 
-    Args:
-        template: Name of the file in `templates/`, without `.md.jinja`.
-        values: Values by their names in the template; `table(header, rows)` is there as well.
-    """
-    return _templates().get_template(f"{template}.md.jinja").render(table=markdown_table, **values)
+    found = templates(PackageLoader("lerobot_excav.evaluation")).get_template(f"{template}.md.jinja")
+    return found.render(table=markdown_table, **values)
 
 
-@cache
-def _templates() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def templates(loader: "BaseLoader") -> "Environment":
+    """Return the environment of Markdown templates that a loader finds."""
+    from jinja2 import Environment, StrictUndefined
 
     return Environment(
-        loader=PackageLoader("lerobot_excav.evaluation"),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
+        loader=loader, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
     )
 
 

@@ -14,28 +14,17 @@ from lerobot_excav.evaluation.validated import validated
 
 
 class EvaluationOrigin(BaseModel):
-    """Command and code of an evaluation, and the training of its policy; None where nothing tells.
-
-    Attributes:
-        command: Command, for a shell.
-        commit: Commit of this repository.
-        modified: Whether the package differed from that commit.
-        packages: Versions by distribution.
-        started: When the command began (UTC).
-        seconds: How long it ran [s].
-        policy: Folder of the checkpoint that played.
-        training: How that checkpoint was trained.
-    """
+    """Command and code of an evaluation, and the training of its policy; None where nothing tells."""
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
-    command: str | None
+    command: str | None  # for a shell
     commit: str | None = None
-    modified: bool = False
-    packages: dict[str, str] = {}
-    started: str | None = None
-    seconds: float | None = None
-    policy: str | None = None
+    modified: bool = False  # the package differed from that commit
+    packages: dict[str, str] = {}  # versions by distribution
+    started: str | None = None  # UTC
+    seconds: float | None = None  # how long the command ran
+    policy: str | None = None  # folder of the checkpoint that played
     training: TrainingFacts | None = None
 
     @classmethod

@@ -1,7 +1,7 @@
 """Tables of evaluations: one row per run, with intervals, and the differences between runs."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,25 +31,13 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the report as plain data."""
-        return {
-            "runs": [run.as_dict() for run in self.runs],
-            "differences": {
-                name: [asdict(difference) for difference in differences]
-                for name, differences in self.differences.items()
-            },
-            "operator": self.operator,
-            "bootstrap_seed": self.bootstrap_seed,
-            "notes": self.notes,
-        }
+        return asdict(replace(self, runs=[])) | {"runs": [run.as_dict() for run in self.runs]}
 
 
 def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) -> Report:
     """Summarise runs and compare each with the first; a run of another world has other scenes and is not compared.
 
-    Args:
-        runs: At least one run.
-        operator: The operator's run, on at least the same scenes and targets.
-        seed: Seed of the bootstrap.
+    The operator's run is on at least the same scenes and targets; `seed` is that of the bootstrap.
 
     Raises:
         DatasetError: Runs are of different tasks, those of one world show different scenes or targets, or the

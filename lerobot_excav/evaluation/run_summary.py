@@ -48,12 +48,7 @@ class RunSummary:
 
 
 def measured(run: Run, operator: Run | None, rng: np.random.Generator) -> dict[str, Value]:
-    """Return the measures of a run by the key of their column.
-
-    Args:
-        run: The run.
-        operator: An operator's run on at least the same scenes and targets, for the ratios.
-        rng: Source of the bootstrap.
+    """Return the measures of a run by the key of their column; ratios are to the operator's run, with the same scenes.
 
     Raises:
         DatasetError: The operator's run lacks scenes and targets, or played another world.

@@ -10,31 +10,18 @@ from lerobot_excav.evaluation.validated import validated
 
 
 class TrainingFacts(BaseModel):
-    """Facts of a training up to one checkpoint; None where no file tells.
-
-    Attributes:
-        name: Name of the training's folder.
-        dataset: Name of the dataset's folder.
-        demonstrations: Episodes given to the training, the held-out ones among them.
-        held_out: Episodes of them that it did not learn from.
-        steps: Steps up to the checkpoint.
-        batch_size: Samples per step.
-        seed: Seed of the training.
-        minutes: Time up to the checkpoint [min].
-        command: Command of the training.
-        commit: Commit of the code.
-    """
+    """Facts of a training up to one checkpoint; None where no file tells."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    name: str
-    dataset: str
-    demonstrations: int | None
-    held_out: int
-    steps: int | None
-    batch_size: int
+    name: str  # of the training's folder
+    dataset: str  # name of its folder
+    demonstrations: int | None  # episodes given to the training, the held-out ones among them
+    held_out: int  # episodes of them that it did not learn from
+    steps: int | None  # up to the checkpoint
+    batch_size: int  # samples per step
     seed: int | None
-    minutes: float | None
+    minutes: float | None  # up to the checkpoint
     command: str | None
     commit: str | None
 
@@ -68,13 +55,9 @@ class _DatasetInfo(BaseModel):
 
 
 def read_training(pretrained: Path) -> TrainingFacts | None:
-    """Read how a checkpoint was trained; its log lies beside the training's folder, as `TRAINING.log`.
+    """Read how the checkpoint `TRAINING/checkpoints/STEP/pretrained_model` was trained; its log is `TRAINING.log`.
 
-    Args:
-        pretrained: Its folder `TRAINING/checkpoints/STEP/pretrained_model`.
-
-    Returns:
-        None if the folder is not a checkpoint of `lerobot-train`, or is gone.
+    None if the folder is not a checkpoint of `lerobot-train`, or is gone.
 
     Raises:
         DatasetError: A file of the checkpoint is damaged.

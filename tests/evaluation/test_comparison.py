@@ -1,13 +1,7 @@
-import numpy as np
 import pytest
 
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.comparison import compare, matched
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(0)
 
 
 def test_differences_are_paired_by_scene_and_target(make_run, scoop_line, rng):

@@ -65,15 +65,10 @@ def test_a_missing_field_is_named(metrics_file, scoop_line, name):
         read_evaluation(metrics_file("m.jsonl", [incomplete]))
 
 
-DAMAGED = [
-    (None, r"--env\.metrics_path"),
-    ("", "empty"),
-    ("{", "not JSON"),
-    ("3", "the whole=3: input should be an obj"),
-]
-
-
-@pytest.mark.parametrize(("text", "message"), DAMAGED)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [(None, r"--env\.metrics_path"), ("", "empty"), ("{", "not JSON"), ("3", "the whole=3: input should be an obj")],
+)
 def test_a_missing_or_damaged_file_is_refused(tmp_path, text, message):
     if text is not None:
         (tmp_path / "m.jsonl").write_text(text)

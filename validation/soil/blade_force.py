@@ -10,8 +10,7 @@ from lerobot_excav.envs.soil import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.forces import blade_force_n
 from validation.soil.column_laws import power_law
 from validation.soil.experiment import Conditions, experiment
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 DEPTHS_M = (0.05, 0.10, 0.15)
 WIDTH_M = 0.33

@@ -10,8 +10,7 @@ import numpy as np
 from validation.soil.column import Collapse, collapse, sand_with_friction
 from validation.soil.column_laws import LAJEUNESSE, LUBE, cone_run_out, power_law
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 FRICTIONS_DEG = (39.0, 30.0)
 LOW_ASPECTS = (0.5, 0.75, 1.0, 1.5)

@@ -6,8 +6,7 @@ from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from validation.soil.blade_force import DEPTHS_M, THEORIES_N, WIDTH_M, blade_sand
 from validation.soil.experiment import Conditions, experiment
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 FRICTION_DEG, STEEL_DEG = 39.0, 26.0
 
@@ -44,7 +43,6 @@ def run(_: Conditions) -> Result:
     """Compare factors, forces and scaling with the tables; the conditions play no part."""
     factor_rows, factor_error = _factors()
     force_rows, force_error = _forces()
-    rakes = tuple(row[0] for row in FACTORS)
     return Result(
         checks=(
             Check("greatest error of a factor", 100.0 * factor_error, "%", high=1.0),
@@ -55,15 +53,7 @@ def run(_: Conditions) -> Result:
             Table(("rake [°]", "β [°]", "N_γ", "N_c", "N_q", "N_a"), factor_rows),
             Table(("rake [°]", *(f"{d} m [N]" for d in DEPTHS_M), "tabulated [N]"), force_rows),
         ),
-        plots=(
-            Plot(
-                "earthmoving_factors",
-                "Factors of the earthmoving equation, 39°",
-                "rake [°]",
-                "factor",
-                tuple(_curves(rakes, factor_rows)),
-            ),
-        ),
+        plots=(_plot(factor_rows),),
         remarks=("The tabulated numbers are rounded; half of their last digit is taken off the error.",),
     )
 
@@ -111,10 +101,11 @@ def _scaling() -> float:
     return max(abs(ratio - 1.0) for ratio in doubled)
 
 
-def _curves(rakes: tuple[float, ...], rows: tuple[tuple[float, ...], ...]) -> list[Series]:
-    curves = []
+def _plot(rows: tuple[tuple[float, ...], ...]) -> Plot:
+    rakes, curves = [row[0] for row in FACTORS], []
     for k, name in enumerate(("N_γ", "N_c", "N_q", "N_a")):
         published, found = ([row[2 + k] for row in table] for table in (FACTORS, rows))
         curves.append(Series(name, rakes, found, style="line", color=k))
         curves.append(Series(f"{name}, tabulated", rakes, published, color=k))
-    return curves
+    title = "Factors of the earthmoving equation, 39°"
+    return Plot("earthmoving_factors", title, "rake [°]", "factor", tuple(curves))

@@ -6,8 +6,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from lerobot_excav.envs.soil import FIDELITIES, PRESETS
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.errors import require
 from validation.soil.results import Check, Result
 
 
@@ -22,8 +21,6 @@ class Conditions:
     quick: bool = False  # leaves out repetitions and coarsens series; gates stay as they are
 
     def __post_init__(self) -> None:
-        require_choice("--soil", self.preset, PRESETS)
-        require_choice("--fidelity", self.fidelity, FIDELITIES)
         require(len(self.seeds) >= 1, "--seeds is empty; give at least one, as in --seeds=0")
         require(min(self.seeds) >= 0, f"--seeds={self.seeds}; allowed: 0 and above")
 

@@ -9,8 +9,7 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
 from validation import Array
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 RAKES_DEG = (25.0, 35.0, 45.0)
 GROUND_M = 1.0

@@ -9,8 +9,7 @@ from lerobot_excav.envs.soil import Soil
 from validation import Array
 from validation.soil.arrangement import cylinder
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 HEIGHTS_M = (0.25, 0.5, 1.0, 2.0)
 
@@ -33,9 +32,8 @@ def fall_time_s(height_m: float, *, preset: str, fidelity: str) -> float:
     time, left, speed = 0.0, height_m, 0.0
     for tick in range(1, 200):
         soil.step(TICK_S)
-        if len(soil.parcel_positions_w) == 0 or soil.parcel_velocities_w[0, 2] > -speed:
-            break
-        if soil.parcel_positions_w[0, 2] <= radius:
+        in_the_air = len(soil.parcel_positions_w) > 0 and soil.parcel_positions_w[0, 2] > radius
+        if not in_the_air or soil.parcel_velocities_w[0, 2] > -speed:
             break
         time, left = tick * TICK_S, float(soil.parcel_positions_w[0, 2]) - radius
         speed = -float(soil.parcel_velocities_w[0, 2])
@@ -68,11 +66,7 @@ def mechanical_energy_j(soil: Soil) -> float:
 
 
 def drift_in_the_air_m(*, preset: str, fidelity: str, seed: int) -> tuple[float, float]:
-    """Let a contracting cloud fall until just before it lands; measure the path of its centre of mass.
-
-    Returns:
-        Horizontal drift, and vertical distance from the parabola, both [m].
-    """
+    """Return horizontal drift and distance from the parabola [m] of the centre of mass of a cloud before it lands."""
     soil = Soil(preset, (4.0, 4.0), 0.05, fidelity, seed)
     cloud(soil, np.random.default_rng(seed), height_m=CLOUD_HEIGHT_M)
     start = centre_of_mass(soil)

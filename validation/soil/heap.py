@@ -10,9 +10,8 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import PRESETS, Soil
 from validation import Array
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
 from validation.soil.resting import steps_until_rest
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 MASS_KG = 485.0
 """A bucket of sand."""

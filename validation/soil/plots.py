@@ -1,9 +1,9 @@
-"""Plots of the report: what they show, and small pictures of it."""
+"""Small pictures of the plots of the report."""
 
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
-from numpy.typing import ArrayLike
+from validation.soil.results import Plot
 
 SIZE_IN = (6.0, 4.0)
 DPI = 110
@@ -13,31 +13,6 @@ _STYLES: dict[str, dict[str, Any]] = {
     "dashed": {"linestyle": "--", "linewidth": 1.1},
     "points": {"linestyle": "none", "marker": "o", "markersize": 4.5},
 }
-
-
-class Series(NamedTuple):
-    """One series of values: points, a curve, or a band between `y` and `y_high`.
-
-    Series of one `color` look alike, such as theory and measurement of one thing; None takes the next colour.
-    """
-
-    label: str
-    x: ArrayLike
-    y: ArrayLike
-    style: Literal["line", "dashed", "points"] = "points"
-    y_high: ArrayLike | None = None
-    color: int | None = None
-
-
-class Plot(NamedTuple):
-    """One picture of the report; `name` is that of its file, without ending."""
-
-    name: str
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Series, ...]
-    logarithmic: bool = False
 
 
 def draw(plot: Plot, path: Path) -> None:

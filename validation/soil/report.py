@@ -5,9 +5,10 @@ import os
 import platform
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import FileSystemLoader
 
 from lerobot_excav.envs.tasks.registry import task_spec
+from lerobot_excav.evaluation.markdown import templates
 from validation.soil.experiment import Conditions, SoilExperiment
 from validation.soil.plots import draw
 from validation.soil.results import Result, number_text
@@ -30,13 +31,7 @@ def write_report(outcomes: list[Outcome], conditions: Conditions, path: Path) ->
 
 def report_text(outcomes: list[Outcome], conditions: Conditions) -> str:
     """Return the report of experiments that ran under some conditions."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
-    )
+    environment = templates(FileSystemLoader(Path(__file__).parent))
     environment.filters["number"] = number_text
     checks = [check for _, result in outcomes for check in result.checks]
     version, simulation = importlib.metadata.version("lerobot_env_excav"), task_spec("task", "Scoop-v0")
@@ -55,6 +50,6 @@ def summary_text(experiment: SoilExperiment, result: Result) -> str:
     """Return one line per gated value, for a terminal."""
     lines = []
     for check in result.checks:
-        line = f"{experiment.code:4} {check.name:62} {check.value_text:>14}   gate {check.gate_text}"
-        lines.append(line if check.passed else f"{line}   MISSED by {check.missed_text}")
+        line = f"{experiment.code:4} {check.name:62} {check.text(check.value):>14}   gate {check.gate_text}"
+        lines.append(line if check.passed else f"{line}   MISSED by {check.text(check.missed_by)}")
     return "\n".join(lines)

@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from validation.soil.plots import Plot
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,9 @@ class Check:
             return math.inf
         return max(self.low - self.value, self.value - self.high, 0.0)
 
-    @property
-    def value_text(self) -> str:
-        """The value with its unit."""
-        return f"{number_text(self.value)} {self.unit}".rstrip()
-
-    @property
-    def missed_text(self) -> str:
-        """The distance to the gate with its unit."""
-        return f"{number_text(self.missed_by)} {self.unit}".rstrip()
+    def text(self, number: float) -> str:
+        """Return a number with the unit."""
+        return f"{number_text(number)} {self.unit}".rstrip()
 
     @property
     def gate_text(self) -> str:
@@ -57,6 +51,31 @@ class Table(NamedTuple):
 
     header: tuple[str, ...]
     rows: tuple[tuple[float | str, ...], ...]
+
+
+class Series(NamedTuple):
+    """One series of values: points, a curve, or a band between `y` and `y_high`.
+
+    Series of one `color` look alike, such as theory and measurement of one thing; None takes the next colour.
+    """
+
+    label: str
+    x: ArrayLike
+    y: ArrayLike
+    style: Literal["line", "dashed", "points"] = "points"
+    y_high: ArrayLike | None = None
+    color: int | None = None
+
+
+class Plot(NamedTuple):
+    """One picture of the report; `name` is that of its file, without ending."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Series, ...]
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from bench.soil import dig_cycle, pile, quickest_steps
 from lerobot_excav.envs.soil import FIDELITIES, Soil
 from validation.soil.arrangement import cylinder
 from validation.soil.experiment import Conditions
-from validation.soil.plots import Plot, Series
+from validation.soil.results import Plot, Series
 
 _EXTENT_M = 6.0
 _SLENDERNESS = 2.5

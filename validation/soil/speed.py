@@ -11,8 +11,7 @@ from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil
 from validation import Array
 from validation.soil.experiment import Conditions, experiment
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 from validation.soil.scaling import add_column, scaling_plots
 
 CARRY_TICKS = slice(350, 500)

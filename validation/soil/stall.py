@@ -13,8 +13,7 @@ from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
 from validation import Array
 from validation.soil.experiment import Conditions, experiment, track
-from validation.soil.plots import Plot, Series
-from validation.soil.results import Check, Result, Table
+from validation.soil.results import Check, Plot, Result, Series, Table
 
 START_RAD = np.array([0.0, 0.6, -1.2, -0.8])
 GROUND_M = 0.6

@@ -96,14 +96,9 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
     def create_envs(
         self, n_envs: int, use_async_envs: bool = False
     ) -> dict[str, dict[int, gym.vector.VectorEnv[Any, Any, Any]]]:
-        """Create the vector environment of one evaluation.
+        """Create the vector environment of one evaluation, as `{self.type: {0: vector environment}}`.
 
-        Args:
-            n_envs: Number of environments that run side by side.
-            use_async_envs: Whether each gets a process of its own; needs `n_envs` > 1 to have an effect.
-
-        Returns:
-            `{name of the environment: {0: vector environment}}`.
+        With `use_async_envs` each of several environments gets a process of its own.
         """
         from lerobot_excav.envs.configs.metrics_log import MetricsLog
         from lerobot_excav.envs.configs.vector import make_vector_env

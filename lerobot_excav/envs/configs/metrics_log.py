@@ -9,9 +9,8 @@ in which LeRobot counts: line `i` of an evaluation is `per_episode[i]` of its `e
 All but the first two entries are the environment's `episode_metrics`. A number that does not exist, such as
 the time of a loading that never began, is `null`.
 
-LeRobot runs whole batches: with `--eval.n_episodes=5 --eval.batch_size=3` it runs six episodes and drops
-the last. `episode_ix` tells them apart, and `max_episodes` leaves them out. Every evaluation of a training
-run appends, and starts again at `episode_ix` 0.
+LeRobot runs whole batches, and drops the episodes beyond those asked for. `episode_ix` tells them apart, and
+`max_episodes` leaves them out. Every evaluation of a training run appends, and starts again at `episode_ix` 0.
 """
 
 import json
@@ -56,23 +55,16 @@ class MetricsLog:
             ) from error
 
     def begin_batch(self, seeds: Sequence[int | None]) -> None:
-        """Start the next batch of one episode per environment.
+        """Start the next batch: an episode for each of `n_envs` environments, with its seed.
 
         A batch that was interrupted is dropped, as LeRobot does not count it either.
-
-        Args:
-            seeds: Seed of each environment, length `n_envs`.
         """
         self._batch += 1
         self._seeds = seeds
         self._finished = {}
 
     def finish_episode(self, env_index: int, info: Mapping[str, Any]) -> None:
-        """Record an episode; later calls for the same environment and batch change nothing.
-
-        Args:
-            env_index: Position of the environment in the batch.
-            info: Information of the last step, with `episode_metrics`.
+        """Record an episode from its last step's `info`; later calls for this environment and batch change nothing.
 
         Raises:
             ConfigurationError: The environment did not end the episode itself, so there are no metrics.
@@ -84,17 +76,11 @@ class MetricsLog:
             "env.metrics_path needs info['episode_metrics'] at the end of an episode, and it is missing; "
             "set the length by episode_length, not by max_episode_steps or a TimeLimit of Gymnasium's.",
         )
-        self._finished[env_index] = self._line(env_index, info)
+        place = {"episode_ix": self._batch * self._n_envs + env_index, "seed": self._seeds[env_index]}
+        self._finished[env_index] = {**place, **info["episode_metrics"]}
         if len(self._finished) == self._n_envs:
             self._append([self._finished[i] for i in range(self._n_envs)])
             write_provenance(self.path)
-
-    def _line(self, env_index: int, info: Mapping[str, Any]) -> dict[str, Any]:
-        return {
-            "episode_ix": self._batch * self._n_envs + env_index,
-            "seed": self._seeds[env_index],
-            **info["episode_metrics"],
-        }
 
     def _append(self, lines: list[dict[str, Any]]) -> None:
         """Append whole lines by one write each, so that two evaluations may share a file."""
@@ -108,7 +94,7 @@ class MetricsLog:
 
 
 def json_line(record: Mapping[str, Any]) -> str:
-    """Return a record as a line of JSON: NumPy scalars as Python's own, and numbers that JSON lacks as null."""
+    """Return a record as a line of JSON."""
     return json.dumps({key: _plain(value) for key, value in record.items()}, allow_nan=False) + "\n"
 
 

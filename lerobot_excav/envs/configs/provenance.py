@@ -27,9 +27,6 @@ def write_provenance(path: Path) -> None:
     It holds `command`, `commit` and whether the package was `modified` since, `packages`, when the process `started`
     (UTC) and for how many `seconds` it has run, and the folder of the `policy` that the command names. A file of that
     name that holds something else is kept. Whatever goes wrong is logged only: no evaluation fails for its record.
-
-    Args:
-        path: The metrics file.
     """
     record_path = path.with_suffix(".json")
     try:

@@ -25,14 +25,10 @@ def make_vector_env(
     use_async: bool = False,
     metrics_log: MetricsLog | None = None,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Create a vector environment for `lerobot-eval`.
+    """Create a vector environment for `lerobot-eval`, whose metrics log hears of the last step of every episode.
 
-    Args:
-        make_env: Makes one environment; must be picklable for `use_async`.
-        n_envs: Number of environments.
-        use_async: Whether each gets a process of its own (a fork server's, so no simulator is inherited).
-            One environment always stays in this process.
-        metrics_log: Receives the information of the last step of every episode.
+    With `use_async` each environment gets a process of its own (a fork server's, so no simulator is inherited), and
+    `make_env` must be picklable. One environment always stays in this process.
 
     Raises:
         ConfigurationError: `n_envs` is below 1.
@@ -78,12 +74,7 @@ class LoggedAsyncVectorEnv(_LoggedVectorEnv, AsyncVectorEnv):
 
 
 def info_of_env(infos: Mapping[str, Any], index: int) -> dict[str, Any]:
-    """Pick one environment's information out of Gymnasium's dictionary of arrays.
-
-    Args:
-        infos: Values of all environments under each key, and under `_key` which environments have one.
-        index: Position of the environment.
-    """
+    """Pick one environment's information out of Gymnasium's arrays, which say under `_key` who has a value of `key`."""
     return {
         key: info_of_env(values, index) if isinstance(values, Mapping) else values[index]
         for key, values in infos.items()

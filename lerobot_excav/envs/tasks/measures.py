@@ -39,25 +39,9 @@ class CommandedTarget(NamedTuple):
 
 
 class EpisodeRecord(BaseModel):
-    """A line of a metrics file. A task adds its own fields in a subclass; entries that are no fields are left out.
+    """A line of a metrics file, whose fields `docs/reference/metrics.md` and `docs/reference/settings.md` define.
 
-    Attributes:
-        simulation_version: Version of the simulation.
-        task: Task, as in `--env.task`.
-        scene_set: Scene set.
-        scene_id: Scene.
-        target_id: Target that is commanded first.
-        mask_source: What made the mask.
-        mask_condition: Which mask was shown.
-        mask_noise: How it was disturbed.
-        mask_noise_px: By how much [px].
-        shown_target_id: Target that the last mask showed, noise aside; -1 if it showed none.
-        target_overlay: Whether the mask was tinted into the main picture.
-        is_success: Whether every part of the task succeeded.
-        frames: Length of the episode.
-        mask_missing: Whether the episode was given up because the source found nothing.
-        mask_missing_frames: Frames in which the machine was held still, because the source had found nothing yet.
-        commands: All commands, in their order; the first begins at frame 0.
+    A task adds its own fields in a subclass; entries that are no fields are left out.
     """
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
@@ -66,18 +50,18 @@ class EpisodeRecord(BaseModel):
     task: str
     scene_set: str
     scene_id: int
-    target_id: int
+    target_id: int  # commanded first
     mask_source: str
     mask_condition: str
     mask_noise: str
     mask_noise_px: int
     target_overlay: bool
-    shown_target_id: int
-    is_success: bool
+    shown_target_id: int  # of the last mask, noise aside; -1 if it showed none
+    is_success: bool  # every part of the task succeeded
     frames: int
-    mask_missing: bool
-    mask_missing_frames: int
-    commands: tuple[CommandedTarget, ...]
+    mask_missing: bool  # the episode was given up because the source found nothing
+    mask_missing_frames: int  # in which the machine was held still, because the source had found nothing yet
+    commands: tuple[CommandedTarget, ...]  # all, in their order; the first begins at frame 0
 
     @model_validator(mode="after")
     def _commands_follow_each_other(self) -> Self:

@@ -1,7 +1,7 @@
 """The masks that an episode was shown, drawn again from its scene and its commands."""
 
-from dataclasses import dataclass
-from typing import Any
+from contextlib import closing
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,7 @@ from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.evaluation.run import Run
 
 
-@dataclass(frozen=True, kw_only=True)
-class ShownMask:
+class ShownMask(NamedTuple):
     """A mask, bool (H, W), and the frame from which it was shown."""
 
     since: int
@@ -27,20 +26,11 @@ def shown_masks(run: Run, key: EpisodeKey, *, height: int, width: int) -> list[S
     Raises:
         RenderingError: Pictures cannot be made on this machine.
     """
-    names = (*MASK_SETTINGS, *run.measures.settings)
-    env = task_spec("task", run.task).make_env(
-        scene_set=key.scene_set,
-        observation_height=height,
-        observation_width=width,
-        **{name: run.constants[name] for name in names},
-    )
-    try:
-        return [
-            ShownMask(since=frame, pixels=_mask(env, key.scene_id, target_id))
-            for frame, target_id in run.first.episodes[key].commands
-        ]
-    finally:
-        env.close()
+    shown = {name: run.constants[name] for name in (*MASK_SETTINGS, *run.measures.settings)}
+    size = {"observation_height": height, "observation_width": width}
+    commands = run.first.episodes[key].commands
+    with closing(task_spec("task", run.task).make_env(scene_set=key.scene_set, **size, **shown)) as env:
+        return [ShownMask(since=frame, pixels=_mask(env, key.scene_id, target_id)) for frame, target_id in commands]
 
 
 def _mask(env: Any, scene_id: int, target_id: int) -> NDArray[np.bool_]:

@@ -21,65 +21,45 @@ class _Table(BaseModel):
 
 
 class Row(_Table):
-    """A row: one evaluation, whose metrics have the name `label`; `about` is its policy in words.
+    """A row: one evaluation."""
 
-    Attributes:
-        paper: Figures of the paper by key of their column, rates in percent.
-    """
-
-    label: str
-    about: str
-    paper: dict[str, float] = {}
+    label: str  # name of its metrics
+    about: str  # the policy, in words
+    paper: dict[str, float] = {}  # the paper's figures by key of their column, rates in percent
 
 
 class Section(_Table):
-    """A table of rows.
-
-    Attributes:
-        title: Heading.
-        rows: The rows.
-        text: What is to be known before.
-        reference: Label of the row that the others are compared with, scene by scene; it may stand elsewhere.
-    """
+    """A table of rows."""
 
     title: str
     rows: tuple[Row, ...] = ()
-    text: str = ""
-    reference: str | None = None
+    text: str = ""  # what is to be known before
+    reference: str | None = None  # label of the row, here or elsewhere, that the others are compared with
 
 
 class CurveSource(_Table):
-    """Evaluations of the checkpoints of one training: their folder, where each is named by its step, and its label."""
+    """Evaluations of the checkpoints of one training."""
 
-    label: str
-    folder: str
+    label: str  # in the plot
+    folder: str  # holds an evaluation per checkpoint, named by its step
 
 
 class Clips(_Table):
-    """Episodes of the row with a label, side by side in the video grid."""
+    """Episodes of one evaluation, side by side in the video grid."""
 
-    label: str
+    label: str  # name of its metrics
     episodes: tuple[int, ...]
 
 
 class Contents(_Table):
-    """Everything on the page.
-
-    Attributes:
-        title: Heading.
-        metrics: Folder of the metrics files.
-        section: Tables.
-        text: What is to be known before.
-        curve: Success against training.
-        clips: Rows of the video grid.
-    """
+    """Everything on the page."""
 
     title: str
-    metrics: str
+    metrics: str  # folder of the metrics files
     section: tuple[Section, ...] = ()
-    text: str = ""
-    curve: tuple[CurveSource, ...] = ()
-    clips: tuple[Clips, ...] = ()
+    text: str = ""  # what is to be known before
+    curve: tuple[CurveSource, ...] = ()  # success against training
+    clips: tuple[Clips, ...] = ()  # rows of the video grid
 
     @property
     def rows(self) -> list[Row]:
@@ -108,12 +88,10 @@ class Contents(_Table):
 
 
 def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
-    """Read what stands on a page.
+    """Read what stands on a page from a TOML file.
 
-    Args:
-        path: The TOML file.
-        metrics: Folder of the metrics files in place of the file's: one that a page has kept, with the curves in it,
-            or that of another run of the experiment, with the curves where they lie seen from the file's folder.
+    `metrics` is a folder of metrics files in place of the file's: one that a page has kept, with the curves in it, or
+    that of another run of the experiment, with the curves where they lie seen from the file's folder.
 
     Raises:
         ConfigurationError: The file is missing or damaged, a key is unknown or missing, a value is of another type, a

@@ -99,11 +99,7 @@ class ResultPage:
 
 
 def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
-    """Read the evaluations of a page and sum them up; what has not been run is left out and named.
-
-    Args:
-        contents: What stands on the page.
-        seed: Seed of the bootstrap.
+    """Read the evaluations of a page and sum them up, bootstrapped from a seed; what was not run is left out and named.
 
     Raises:
         ConfigurationError: A figure of the paper has no column, or an evaluation mixes conditions.

@@ -19,13 +19,7 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4`, and `metrics/LABEL.jsonl`
     with `metrics/LABEL.json`, where it comes from. A page can be made again from these copies; those of an earlier page
     are removed. A plot or video that could not be made again, because checkpoints or videos are gone, stays.
-
-    Args:
-        page: The page.
-        folder: Where to; it is made.
-
-    Returns:
-        What was written, but for the copies.
+    Returns what was written, but for the copies.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _keep_metrics(page, folder / "metrics")
@@ -66,11 +60,9 @@ def _copy_metrics(run: Run, copy: Path, origin: EvaluationOrigin) -> Path:
 
 
 def _pictures(page: ResultPage, folder: Path) -> list[Path]:
-    written = []
+    clips = grid_clips(page)
     if page.curves:
         plot_curves(page.curves, folder / CURVE_PLOT)
-        written.append(folder / CURVE_PLOT)
-    if clips := grid_clips(page):
+    if clips:
         write_grid(folder / VIDEO_GRID, clips)
-        written.append(folder / VIDEO_GRID)
-    return written
+    return [folder / name for name, shown in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if shown]

@@ -19,10 +19,8 @@ _POINT = ("policy", "played with", "step", "minutes", "n", "success [%]")
 def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Clips] | None = None) -> str:
     """Write a page as Markdown.
 
-    Args:
-        page: The page.
-        files: Names of the plots and videos that lie beside it.
-        clips: What the video grid shows, from top to bottom; None: all that the contents name.
+    `files` are the plots and videos that lie beside it; `clips` what the video grid shows, from top to bottom, or None
+    for all that the contents name.
     """
     return render(
         "page",

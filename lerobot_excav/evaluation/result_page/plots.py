@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from lerobot_excav.evaluation.result_page.curves import CurvePoint, SuccessCurve
 
 if TYPE_CHECKING:
@@ -37,15 +39,7 @@ def plot_curves(curves: Sequence[SuccessCurve], path: Path) -> None:
 
 
 def _draw(axis: "Axes", label: str, points: Sequence[tuple[float, CurvePoint]]) -> None:
-    success = [point.success for _, point in points]
-    axis.errorbar(
-        [place for place, _ in points],
-        [100.0 * rate.estimate for rate in success],
-        yerr=[
-            [100.0 * (rate.estimate - rate.low) for rate in success],
-            [100.0 * (rate.high - rate.estimate) for rate in success],
-        ],
-        marker="o",
-        capsize=3,
-        label=label,
-    )
+    rates = [(point.success.low, point.success.estimate, point.success.high) for _, point in points]
+    low, estimate, high = 100.0 * np.array(rates).reshape(-1, 3).T
+    places, errors = [place for place, _ in points], [estimate - low, high - estimate]
+    axis.errorbar(places, estimate, yerr=errors, marker="o", capsize=3, label=label)

@@ -29,11 +29,9 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Args:
         checkpoint: A `pretrained_model` folder of lerobot-train.
-        out: Folder to write; files of an earlier export in it are replaced.
+        out: Folder to write: `config.json`, `model.safetensors`, the processors, `README.md`; it is returned. Files of
+            an earlier export in it are replaced.
         facts: What the model card tells beyond what the checkpoint knows.
-
-    Returns:
-        The folder written: `config.json`, `model.safetensors`, the processors, `README.md`.
 
     Raises:
         ConfigurationError: The folder does not hold a checkpoint of `mask_act`, is the one to write, or holds a

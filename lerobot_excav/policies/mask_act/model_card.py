@@ -18,32 +18,18 @@ TRAINING_STEP = Path("../training_state/training_step.json")
 
 @dataclass(frozen=True, kw_only=True)
 class CardFacts:
-    """What a model card tells beyond what the checkpoint knows.
-
-    Attributes:
-        title: Heading of the card.
-        env_type: Environment that the policy was trained for, for the command that runs it.
-        results: Markdown for the section "Evaluation", such as the table of `lerobot-excav report`.
-        license: Name of the licence, as the Hugging Face Hub spells it.
-    """
+    """What a model card tells beyond what the checkpoint knows."""
 
     title: str = "mask_act"
-    env_type: str = "excavator"
-    results: str = ""
-    license: str = "apache-2.0"
+    env_type: str = "excavator"  # that the policy was trained for, for the command that runs it
+    results: str = ""  # Markdown for the section "Evaluation", such as the table of `lerobot-excav report`
+    license: str = "apache-2.0"  # as the Hugging Face Hub spells it
 
 
 def model_card(checkpoint: Path, config: MaskACTConfig, parameters: int, facts: CardFacts) -> ModelCard:
-    """Write the card of a policy.
+    """Write the card of a policy with a number of parameters, and the metadata that the Hugging Face Hub reads.
 
-    Args:
-        checkpoint: Its `pretrained_model` folder; training settings are read from it if they lie there.
-        config: Its settings.
-        parameters: Number of its parameters.
-        facts: What the checkpoint does not know.
-
-    Returns:
-        The card, with the metadata that the Hugging Face Hub reads; `str` gives its Markdown.
+    Training settings are read from the `pretrained_model` folder if they lie there. `str` gives the card's Markdown.
     """
     training = training_facts(checkpoint)
     metadata = ModelCardData(

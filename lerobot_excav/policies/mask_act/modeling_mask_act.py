@@ -14,7 +14,7 @@ from torch import Tensor
 from lerobot_excav.errors import require_choice
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
-from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsemble
+from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
 from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
 
 
@@ -48,7 +48,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self._watch = TargetWatch()
         self._queue = ActionQueue(resolved(config.n_action_steps))
         self._ensemble = (
-            TemporalEnsemble(config.temporal_ensemble_coeff, config.chunk_size)
+            TemporalEnsembles(config.temporal_ensemble_coeff, config.chunk_size)
             if config.temporal_ensemble_coeff is not None
             else None
         )

@@ -21,13 +21,6 @@ def make_mask_act_pre_post_processors(
     The mask is excluded by the list of keys to normalise, not by its features or its statistics: fine-tuning
     (`lerobot-train --policy.path`) replaces features and statistics, and `--dataset.use_imagenet_stats` gives every
     image feature statistics of photographs. The list is saved with the step and survives both.
-
-    Args:
-        config: Settings of the policy, with its features.
-        dataset_stats: Statistics per feature.
-
-    Returns:
-        Preprocessor of observations and postprocessor of actions.
     """
     steps = make_default_policy_processor_steps(config, dataset_stats, normalizer_device=config.device)
     normalize = NormalizerProcessorStep(

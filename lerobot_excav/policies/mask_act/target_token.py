@@ -28,7 +28,6 @@ class TargetToken(nn.Module):
         self.no_target_embed = nn.Parameter(torch.zeros(dim_model))
         nn.init.normal_(self.kind_embed, std=0.02)
         nn.init.normal_(self.no_target_embed, std=0.02)
-        self.register_load_state_dict_pre_hook(_take_features_whole)  # type: ignore[no-untyped-call]
 
     def forward(self, features: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """Return the token and its position encoding.
@@ -50,12 +49,6 @@ class TargetToken(nn.Module):
         placed = self.position_proj(position) + self.kind_embed
         token = torch.where(has_target, self.feature_gain * content + placed, self.no_target_embed)
         return token, position
-
-
-def _take_features_whole(_: nn.Module, weights: dict[str, Tensor], prefix: str, *__: object) -> None:
-    """Complete a checkpoint from before the gain: its network was trained with a gain of one."""
-    if f"{prefix}position_proj.weight" in weights:
-        weights.setdefault(f"{prefix}feature_gain", torch.ones(()))
 
 
 def mean_position(mask: Tensor, cells: tuple[int, int], dim: int) -> Tensor:

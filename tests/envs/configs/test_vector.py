@@ -4,15 +4,13 @@ Most tests use a stand-in environment with episodes of different lengths.
 """
 
 import json
-from dataclasses import dataclass
+from unittest.mock import create_autospec
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from lerobot.configs import PreTrainedConfig
 from lerobot.envs.configs import EnvConfig
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.processor import PolicyProcessorPipeline
 from lerobot.scripts.lerobot_eval import eval_policy
 
 import lerobot_excav.plugin  # noqa: F401 - registers every --env.type
@@ -59,39 +57,17 @@ def countdown_maker():
     return Countdown
 
 
-@PreTrainedConfig.register_subclass("tenth_for_vector_test")
-@dataclass
-class TenthConfig(PreTrainedConfig):
-    observation_delta_indices = action_delta_indices = reward_delta_indices = None
-
-    def get_optimizer_preset(self): ...
-    def get_scheduler_preset(self): ...
-    def validate_features(self): ...
-
-
-class TenthPolicy(PreTrainedPolicy):
+def tenth(batch):
     """Answer every observation with a tenth of its state."""
-
-    config_class = TenthConfig
-    name = "tenth_for_vector_test"
-
-    def get_optim_params(self): ...
-    def reset(self): ...
-    def forward(self, batch): ...
-    def predict_action_chunk(self, batch, **kwargs): ...
-
-    def select_action(self, batch, **kwargs):
-        state = batch["observation.state"]
-        return 0.1 * (state if state.shape[1] == ARM_STATE_SIZE else state[:, :4])
+    state = batch["observation.state"]
+    return 0.1 * (state if state.shape[1] == ARM_STATE_SIZE else state[:, :4])
 
 
 def evaluate(env, path, start_seed=100):
     """Return what LeRobot counts, and the lines of the metrics file."""
-    same = PolicyProcessorPipeline(steps=[])
-    same_action = PolicyProcessorPipeline(
-        steps=[], to_transition=lambda action: {"action": action}, to_output=lambda t: t["action"]
-    )
-    policy, processors = TenthPolicy(TenthConfig(device="cpu")), (same, same, same, same_action)
+    processors = 4 * [lambda unchanged: unchanged]
+    policy = create_autospec(PreTrainedPolicy, instance=True, training=False)
+    policy.select_action.side_effect = tenth
     try:
         counted = eval_policy(env, policy, *processors, n_episodes=EPISODES, start_seed=start_seed)["per_episode"]
     finally:

@@ -8,16 +8,6 @@ SECTION = '[[section]]\ntitle = "s"\n'
 PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
 
 
-@pytest.fixture
-def read(tmp_path):
-    def read(text):
-        path = tmp_path / "rows.toml"
-        path.write_text(f'title = "t"\nmetrics = "m"\n{text}')
-        return read_contents(path)
-
-    return read
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -40,25 +30,20 @@ def read(tmp_path):
         ('[[clips]]\nlabel = "a"\nepisodes = [0.5]', r"clips\[0\]\.episodes\[0\]=0.5: input should be a valid integer"),
     ],
 )
-def test_a_file_that_cannot_be_used_says_why(read, text, message):
+def test_a_file_that_cannot_be_used_says_why(read_rows, text, message):
     with pytest.raises(ConfigurationError, match=message):
-        read(text)
+        read_rows(text)
 
 
-def test_rows_and_figures_are_read_as_their_fields_say(read):
-    (section,) = read(PAPER % "{ success = 96 }").section
-    assert section.rows[0].paper == {"success": 96.0}
-    assert (section.text, section.reference) == ("", None)
+def test_rows_and_figures_are_read_as_their_fields_say(read_rows, tmp_path):
+    contents = read_rows(PAPER % "{ success = 96 }")
+    assert contents.rows[0].paper == {"success": 96.0}
+    assert contents.metrics_path("a") == tmp_path / "test" / "a.jsonl"  # or in a folder, as elsewhere in these tests
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match=r"--rows=.*none\.toml does not exist"):
         read_contents(tmp_path / "none.toml")
-
-
-def test_metrics_lie_in_a_folder_or_a_file(tmp_path, read):
-    contents = read(f"{SECTION}rows = [{ROW}]")
-    assert str(contents.metrics_path("a")) == "m/a.jsonl"
 
 
 def test_with_metrics_elsewhere_curves_lie_where_they_did_seen_from_there(tmp_path):

@@ -1,5 +1,3 @@
-import json
-
 import pytest
 
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -8,28 +6,23 @@ from lerobot_excav.evaluation.result_page.curves import read_curve
 
 
 @pytest.fixture
-def curve(tmp_path, grasp_line):
+def curve(tmp_path, metrics_file, grasp_line):
     """Write evaluations of 2 episodes by the stem of their file, and read them as a curve."""
 
     def read(**evaluations):
         for name, changes in evaluations.items():
             lines = [grasp_line(i, **{"scene_set": "val", **changes, **changes.get(f"at_{i}", {})}) for i in range(2)]
-            (tmp_path / f"{name[1:]}.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+            metrics_file(f"{name[1:]}.jsonl", lines)
         return read_curve(CurveSource(label="c", folder=str(tmp_path)))
 
     return read
 
 
-def test_points_stand_by_their_step_and_say_what_they_played(curve):
-    points = curve(_2000={}, _100={"mask_condition": "correct"}).points
+def test_points_stand_by_their_step_and_files_whose_name_is_no_step_are_no_points(curve):
+    points = curve(_2000={}, _100={}, _3a={}).points
     assert [(p.step, p.scene_set, p.run.setting, p.n) for p in points] == [
-        (100, "val", {"mask": "correct"}, 2),
-        (2000, "val", {"mask": "correct"}, 2),
+        (step, "val", {"mask": "correct"}, 2) for step in (100, 2000)
     ]
-
-
-def test_files_whose_name_is_no_step_are_no_points(curve):
-    assert [point.step for point in curve(_100={}, _3a={}).points] == [100]
 
 
 @pytest.mark.parametrize(

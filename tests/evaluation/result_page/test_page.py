@@ -34,17 +34,14 @@ def again(tmp_path):
     return lambda out: make_page(contents(tmp_path, metrics=out / "metrics"))
 
 
-def test_rows_know_their_numbers_and_where_they_come_from(finished):
-    paired, zero = make_page(finished).rows
+def test_rows_know_where_they_come_from_and_are_compared_with_the_reference_on_common_scenes(finished):
+    (section,) = make_page(finished).sections
+    paired, zero = section.rows
     assert (paired["success"].estimate, zero["success"].estimate) == (1.0, 0.0)
     assert paired.origin.commit.startswith("0123")
     training = paired.origin.training
     assert (training.name, training.dataset, training.steps, training.minutes) == ("paired", "pairs", 2000, 20.0)
     assert (training.demonstrations, training.held_out, training.samples) == (200, 40, 32000)
-
-
-def test_rows_are_compared_with_the_reference_on_common_scenes(finished):
-    (section,) = make_page(finished).sections
     (difference,) = section.differences
     assert (difference.label, difference.reference, difference.scenes) == ("zero", "paired", 5)
     assert difference.differences[0].difference.estimate == -1.0

@@ -3,13 +3,12 @@ import inspect
 import pytest
 import torch
 import torchvision
-from lerobot.configs.types import FeatureType, PolicyFeature
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
-from .conftest import BACKBONES, MASK, STATE, stem, visual
+from .conftest import BACKBONES, INPUT_FEATURES, MASK, STATE, stem, visual
 
 
 def test_the_configuration_is_annotated_with_its_class():
@@ -17,17 +16,9 @@ def test_the_configuration_is_annotated_with_its_class():
     assert inspect.signature(MaskACTPolicy.__init__).parameters["config"].annotation is MaskACTConfig
 
 
-def test_a_policy_can_be_built_for_another_camera_and_no_mask():
-    config = MaskACTConfig(
-        preset="fast",
-        device="cpu",
-        input_features={
-            "observation.images.laptop": visual(3, 84, 84),
-            STATE: PolicyFeature(type=FeatureType.STATE, shape=(6,)),
-        },
-        output_features={"action": PolicyFeature(type=FeatureType.ACTION, shape=(6,))},
-    )
-    assert MaskACTPolicy(config).config.main_camera_key == "observation.images.laptop"
+def test_a_policy_can_be_built_for_another_camera_and_no_mask(policy):
+    features = {"observation.images.laptop": visual(3, 84, 84), STATE: INPUT_FEATURES[STATE]}
+    assert policy(input_features=features).config.main_camera_key == "observation.images.laptop"
 
 
 @pytest.mark.parametrize("backbone", BACKBONES)

@@ -90,10 +90,12 @@ def test_reset_forgets_plans_and_admits_another_batch_size(awake, batch, setting
     torch.testing.assert_close(agent.select_action(observation), expected)
 
 
-def test_a_plan_may_start_in_inference_mode_and_be_replaced_outside(awake, batch, mask):
-    agent = awake()
+@pytest.mark.parametrize("settings", [{}, {"temporal_ensemble_coeff": 0.01}])
+def test_a_plan_may_start_in_inference_mode_and_be_continued_and_replaced_outside(awake, batch, mask, settings):
+    agent = awake(**settings)
     with torch.inference_mode():
         agent.select_action(batch())
+    agent.select_action(batch())
     assert torch.isfinite(agent.select_action({**batch(), MASK: mask(3, top=0, left=0)})).all()
 
 

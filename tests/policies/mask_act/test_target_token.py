@@ -112,10 +112,3 @@ def test_a_fresh_token_reads_the_place_alone_and_training_finds_the_features(fre
     assert not torch.equal(token, fresh(features(0), blob(3, 6))[0])
     token.square().sum().backward()
     assert fresh.feature_gain.grad != 0
-
-
-def test_a_checkpoint_from_before_the_gain_takes_the_features_whole(fresh):
-    weights = fresh.state_dict()
-    del weights["feature_gain"]
-    fresh.load_state_dict(weights, strict=True)
-    assert fresh.feature_gain == 1

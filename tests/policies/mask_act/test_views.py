@@ -28,13 +28,6 @@ def test_mask_joins_the_main_camera_and_zeros_the_others(config, batch):
     assert torch.equal(main[:, :3], observation[MAIN])
 
 
-def test_a_withheld_mask_is_zero_and_needs_no_feature(config, batch):
-    observation = batch()
-    assert not target_mask(config(withhold_mask=True), observation).any()
-    del observation[MASK]
-    assert not target_mask(config(withhold_mask=True), observation).any()
-
-
 def test_missing_pictures_are_named_with_what_to_do(config, batch):
     observation = batch()
     mask = observation.pop(MASK)

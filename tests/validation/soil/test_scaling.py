@@ -21,13 +21,3 @@ def test_the_quickest_run_of_every_step_counts(monkeypatch):
     timed = lambda soil, tools: bench.StepTimes(np.array(next(runs)), np.zeros(2), np.zeros(2))  # noqa: E731
     monkeypatch.setattr(bench, "timed_steps", timed)
     assert bench.quickest_steps(Soil, [None] * 2, 2).ms.tolist() == [1.0, 3.0]
-
-
-def test_plots_show_every_fidelity(monkeypatch):
-    one = lambda *_: [scaling.StepTime(40.0, 1.0)]  # noqa: E731
-    monkeypatch.setattr(scaling, "parcel_scaling", one)
-    monkeypatch.setattr(scaling, "grid_scaling", one)
-    parcels, cells = scaling.scaling_plots(Conditions(fidelity="fine"))
-    assert (parcels.name, cells.name) == ("scaling", "scaling_grid")
-    assert [curve.label for curve in parcels.curves] == list(FIDELITIES)
-    assert [curve.label for curve in cells.curves] == ["fine"]
