@@ -60,9 +60,6 @@ class Payload:
     As part of the mass matrix the load takes part in every acceleration. An external force m (g - a) instead
     would lag by a step and go unstable once the load outweighs the bucket.
 
-    Args:
-        model: The compiled machine; its payload body is written to.
-
     Attributes:
         mass_kg: Mass carried now.
     """

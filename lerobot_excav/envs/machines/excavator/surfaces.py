@@ -44,15 +44,9 @@ def box_grid(container: Container) -> NDArray[np.float64]:
 def skin_vertices(
     grid: NDArray[np.float64], heights_m: NDArray[np.float64], foot_m: float | NDArray[np.float64] = -_SKIRT_DEPTH_M
 ) -> NDArray[np.float32]:
-    """Return the vertices of a soil skin: the surface, then a skirt that closes its border downwards.
+    """Return the vertices (nx ny + border, 3) of a soil skin: the surface, then a skirt that closes its border below.
 
-    Args:
-        grid: Ground-plane points, shape (nx, ny, 2) [m].
-        heights_m: Heights at those points, shape (nx, ny) [m].
-        foot_m: Height of the skirt's foot, one or (nx, ny) [m].
-
-    Returns:
-        Vertices, shape (nx ny + border, 3).
+    Ground-plane points are (nx, ny, 2), heights (nx, ny), and the height of the skirt's foot one or (nx, ny) [m].
     """
     top = np.concatenate([grid, heights_m[..., None]], axis=-1).reshape(-1, 3)
     border = _border(heights_m.shape)

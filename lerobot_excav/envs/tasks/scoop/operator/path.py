@@ -56,18 +56,16 @@ class BucketPose:
 
 def line(start: BucketPose, end: BucketPose, *, about_pin: bool, samples: int = 24) -> list[BucketPose]:
     """Interpolate two poses, with the bucket pin (or else the cutting edge) on a straight line in the cylinder."""
+
+    def numbers(pose: BucketPose) -> NDArray[np.float64]:
+        place = (pose.pin_radius_m, pose.pin_height_m) if about_pin else (pose.radius_m, pose.height_m)
+        return np.array([*place, pose.pitch_rad, pose.swing_rad])
+
     poses = []
     for s in np.linspace(0.0, 1.0, samples):
-        pitch = (1 - s) * start.pitch_rad + s * end.pitch_rad
-        swing = (1 - s) * start.swing_rad + s * end.swing_rad
-        if about_pin:
-            radius = (1 - s) * start.pin_radius_m + s * end.pin_radius_m
-            height = (1 - s) * start.pin_height_m + s * end.pin_height_m
-            poses.append(BucketPose.of_pin(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
-        else:
-            radius = (1 - s) * start.radius_m + s * end.radius_m
-            height = (1 - s) * start.height_m + s * end.height_m
-            poses.append(BucketPose(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
+        radius, height, pitch, swing = ((1 - s) * numbers(start) + s * numbers(end)).tolist()
+        make = BucketPose.of_pin if about_pin else BucketPose
+        poses.append(make(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
     return poses
 
 

@@ -38,12 +38,7 @@ class Variation:
 
 
 def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
-    """Draw the style of one cycle.
-
-    Args:
-        rng: Source of the style.
-        phase_count: Number of phases that get a pause of their own.
-    """
+    """Draw the style of one cycle, with a pause before each of its phases."""
     return Variation(
         speed=rng.uniform(0.85, 1.0),
         entry_along_m=rng.uniform(0.0, 0.16),
