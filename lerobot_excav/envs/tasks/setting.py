@@ -30,7 +30,7 @@ class Allowed:
         low: Least value.
         high: Greatest value.
         also: Another type whose values all do, where Python code and not a command line gives them.
-    hint: What to do about a wrong one, added to the message.
+        hint: What to do about a wrong one, added to the message.
         is_column: Whether datasets have a column `excav.<name>` of it.
         changes_start: Whether the same scene starts otherwise under another value.
     """
@@ -92,11 +92,7 @@ def declared_settings(cls: type) -> dict[str, Allowed]:
 
 
 def check_settings(settings: Any, prefix: str = "") -> None:
-    """Check every setting of a dataclass.
-
-    Args:
-        settings: The dataclass.
-        prefix: What the user writes before the name of a field, such as `env.`.
+    """Check every setting of a dataclass, before whose names the user writes a prefix such as `env.`.
 
     Raises:
         ConfigurationError: A value is of another type or not allowed; the message names the field.

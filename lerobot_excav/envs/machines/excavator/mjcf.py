@@ -20,10 +20,7 @@ _AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift
 
 
 def build_spec(container: Container = TARGET_BOX) -> mujoco.MjSpec:
-    """Assemble the model.
-
-    Args:
-        container: Target box; the world frame is that of the soil.
+    """Assemble the model, with a target box; the world frame is that of the soil.
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies

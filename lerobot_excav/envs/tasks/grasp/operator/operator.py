@@ -14,11 +14,8 @@ class GraspOperator:
     """Grasps the commanded block and puts it into the tray.
 
     It sees where the block lies and plans way-points, whose path inverse kinematics turns into joint position targets;
-    way-points and pace differ from grasp to grasp. A new command makes it plan again, with open fingers: what they
-    hold by then falls.
-
-    Args:
-        rng: Source of way-points and pace.
+    way-points and pace, drawn from `rng`, differ from grasp to grasp. A new command makes it plan again, with open
+    fingers: what they hold by then falls.
     """
 
     def __init__(self, *, rng: np.random.Generator) -> None:

@@ -70,14 +70,11 @@ def line(start: BucketPose, end: BucketPose, *, about_pin: bool, samples: int = 
 
 
 def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> NDArray[np.float64]:
-    """Solve for the joints, giving way in pitch where the wanted one is out of reach.
+    """Solve for the joints (4,) [rad], giving way in pitch where the wanted one is out of reach.
 
     Args:
         pose: Wanted pose.
         keep: What stays in place when the pitch gives way: the cutting `edge` or the bucket `pin`.
-
-    Returns:
-        Joint positions [rad], shape (4,).
 
     Raises:
         UnreachableError: No pitch within 1.3 rad brings the bucket there.
