@@ -30,8 +30,11 @@ def test_compiled_links_have_the_masses_and_inertias_of_the_constants(compiled, 
 
 
 def test_compiled_joints_have_the_order_ranges_torques_and_gains_of_the_constants(compiled):
-    names = [compiled.joint(i).name for i in range(compiled.njnt)]
-    assert names == list(const.JOINT_NAMES) == [compiled.actuator(i).name for i in range(compiled.nu)]
+    assert (
+        [compiled.joint(i).name for i in range(compiled.njnt)]
+        == list(const.JOINT_NAMES)
+        == [compiled.actuator(i).name for i in range(compiled.nu)]
+    )
     torque = np.array(const.JOINT_TORQUE_NM)
     for found, expected in (
         (compiled.jnt_range, const.JOINT_RANGE_RAD),

@@ -150,8 +150,11 @@ def test_unusable_joint_position_is_refused(machine, joint_pos):
 def test_appearance_changes_colours_and_light_but_no_physics():
     machine = ExcavatorMachine()
     before = machine.model.body_mass.copy(), machine.model.geom_size.copy()
-    machine.set_appearance(Appearance(machine_rgb=(0.1, 0.2, 0.3), light_dir_w=(0.0, 0.0, -2.0), light_intensity=0.5))
-    np.testing.assert_allclose(machine.model.material("machine").rgba[:3], [0.1, 0.2, 0.3], atol=1e-6)
+    look = {"machine_rgb": (0.1, 0.2, 0.3), "soil_rgb": (0.4, 0.3, 0.2)}
+    machine.set_appearance(Appearance(**look, light_dir_w=(0.0, 0.0, -2.0), light_intensity=0.5))
+    np.testing.assert_allclose(machine.model.material("machine").rgba[:3], look["machine_rgb"], atol=1e-6)
+    of_skins = machine.model.mat_rgba[machine.model.skin_matid, :3]  # they draw the soil
+    np.testing.assert_allclose(of_skins, [look["soil_rgb"]] * len(of_skins), atol=1e-6)
     np.testing.assert_allclose(machine.model.light("sun").dir, [0.0, 0.0, -1.0])
     np.testing.assert_allclose(machine.model.light("sun").diffuse, 0.5)
     np.testing.assert_array_equal(machine.model.body_mass, before[0])

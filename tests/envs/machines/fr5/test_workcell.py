@@ -29,11 +29,6 @@ def test_same_actions_give_bit_equal_traces(workcell, scene, holding):
     assert np.array_equal(first, trace(Workcell()))
 
 
-def test_a_tick_lasts_a_fiftieth_of_a_second(started, holding):
-    started.tick(holding)
-    assert started.data.time == pytest.approx(0.02, abs=1e-12)
-
-
 def test_targets_beyond_the_limits_are_clipped(started, scene):
     for _ in range(100):
         started.tick(np.array([*scene.joint_pos[:5], 100.0, 7.0]))

@@ -14,12 +14,6 @@ def test_operator_puts_the_commanded_block_into_the_tray(play, scene_id, fps):
     assert task.is_success
 
 
-def test_operator_turns_to_a_new_target(play):
-    task, _, _ = play(1, 2, frames=450, retarget=(40, 0))
-    assert task.is_success
-    assert task.metrics()["first_grasped_block"] == 0
-
-
 def test_same_seed_gives_the_same_actions_and_another_seed_others(play):
     first = play(0, 0, seed=5, frames=60)[2]
     assert np.array_equal(first, play(0, 0, seed=5, frames=60)[2])
