@@ -26,13 +26,10 @@ _DIVERGENCE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVE
 class ExcavatorMachine:
     """An excavator on a fixed base, with rate-controlled swing, boom, arm and bucket.
 
-    Args:
-        container: Target box that stands beside the machine.
-
     Attributes:
         model: The compiled MuJoCo model.
         data: Its state.
-        container: The target box.
+        container: The target box beside it.
         box_contact_force_n: Greatest normal force between machine and target box during the last tick, summed over
             contacts.
     """

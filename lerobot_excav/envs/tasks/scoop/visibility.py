@@ -20,16 +20,9 @@ def seen_area_px(
     A surface element of vector area A at v before the eye covers f² (A · v) / d³ of a picture of focal length f, where
     d is the depth of the element along the optical axis (perspective projection).
 
-    Args:
-        heights_m: Soil surface [m], shape (nx, ny).
-        x_w: Cell centres along x [m], shape (nx,).
-        y_w: Cell centres along y [m], shape (ny,), same spacing.
-        pose: A camera that is fixed to the world.
-        picture_height_px: Height of the picture.
-
-    Returns:
-        Areas [px], shape (nx, ny): zero for cells that face away, or that other soil hides. The borders of the picture
-        are not regarded.
+    The soil is that of `feasible_centers_w`, the camera fixed to the world, its picture so many pixels high. The areas
+    (nx, ny) [px] are zero for cells that face away, or that other soil hides. The borders of the picture are not
+    regarded.
     """
     cell_size_m = float(x_w[1] - x_w[0])
     eye_w = np.asarray(pose.position)

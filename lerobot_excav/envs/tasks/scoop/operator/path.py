@@ -96,11 +96,8 @@ class JointMotion:
     """A joint path run through within the machine's speeds and accelerations.
 
     The path is first timed so that the busiest joint runs at full speed, then its clock is started and stopped
-    with a ramp long enough for the slowest joint to accelerate.
-
-    Args:
-        path: Joint positions [rad], shape (n, 4), n >= 2.
-        speed: Fraction of the machine's speeds to use.
+    with a ramp long enough for the slowest joint to accelerate. The path is (n, 4) [rad], n >= 2; `speed` is the
+    fraction of the machine's speeds to use.
     """
 
     def __init__(self, path: Sequence[NDArray[np.float64]] | NDArray[np.float64], *, speed: float) -> None:
