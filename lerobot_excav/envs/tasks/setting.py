@@ -108,7 +108,9 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
         return
     if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
         names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
-        wanted = allowed.words if allowed.values is not None else f"{' or '.join(names)} {allowed.words}"
+        is_beyond = isinstance(value, int | float) and allowed.high is not None and value > allowed.high
+        limits = f"from {allowed.low} to {allowed.high}" if is_beyond else allowed.words
+        wanted = limits if allowed.values is not None else f"{' or '.join(names)} {limits}"
         raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip())
 
 
