@@ -194,6 +194,7 @@ def test_the_connected_robot_can_be_found(make_robot, robot_type):
         ("scene_set", "exam", "train, val, test"),
         ("mask_condition", "wrong", "mismatched"),
         ("scene_id", -1, "from 0 on"),
+        ("scene_id", 2**31, "from 0 to 2147483647"),
         ("target_id", 4, "0, 1, 2, 3"),
         ("advance", "never", "episode, button"),
     ],

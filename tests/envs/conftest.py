@@ -20,8 +20,8 @@ class OperatedCell:
     fps: int = 50
 
 
-def _play(workcell, scene_id, target_id, *, seed=0, frames=400, fps=50, retarget=None):
-    """Let the operator play; returns the task, rewards and actions. `retarget`: (frame, target_id)."""
+def _play(workcell, scene_id, target_id, *, seed=0, frames=400, fps=50):
+    """Let the operator play; returns the task, rewards and actions."""
     scene = draw_scene("train", scene_id)
     workcell.reset(scene)
     view = OperatedCell(workcell, target_id, fps)
@@ -29,10 +29,7 @@ def _play(workcell, scene_id, target_id, *, seed=0, frames=400, fps=50, retarget
     operator = GraspOperator(rng=np.random.default_rng(seed))
     operator.reset(view)
     rewards, actions = [], []
-    for frame in range(frames):
-        if retarget is not None and frame == retarget[0]:
-            task.retarget(retarget[1])
-            view.target_id = retarget[1]
+    for _ in range(frames):
         action = operator.act(view)
         for _ in range(50 // fps):
             workcell.tick(action)

@@ -52,11 +52,6 @@ class CameraPictures:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
 
-    @property
-    def is_open(self) -> bool:
-        """Whether there is a graphics context now."""
-        return self._context is not None
-
     def colour(self, camera: str, options: Any) -> NDArray[np.uint8]:
         """Return a colour picture (H, W, 3), uint8."""
         self._draw(camera, options)

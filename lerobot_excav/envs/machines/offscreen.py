@@ -19,14 +19,7 @@ def default_backend() -> str:
 
 
 def create_context(width: int, height: int) -> Any:
-    """Create an OpenGL context that draws off screen and make it current.
-
-    Args:
-        width: Width of the pictures [px].
-        height: Height of the pictures [px].
-
-    Returns:
-        A MuJoCo `GLContext`, with `make_current()` and `free()`.
+    """Create an OpenGL context for pictures of a size [px], make it current and return it, a MuJoCo `GLContext`.
 
     Raises:
         RenderingError: No context can be made here.

@@ -49,14 +49,7 @@ class PinholeCamera:
     width: int
 
     def points_w(self, depth_m: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the points behind the pixels.
-
-        Args:
-            depth_m: Distance along the optical axis, (H, W) [m].
-
-        Returns:
-            World points, (H, W, 3) [m].
-        """
+        """Return the world points (H, W, 3) [m] behind the pixels, at distances (H, W) [m] along the optical axis."""
         focal_px = 0.5 * self.height / np.tan(0.5 * self.fovy_rad)
         row, column = np.indices(depth_m.shape)
         right = (column + 0.5 - 0.5 * self.width) / focal_px

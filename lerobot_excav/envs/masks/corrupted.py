@@ -49,13 +49,8 @@ class CorruptedSource:
         if shown is None or self._condition == "zero":
             return shown
         pixels = noisy_pixels(shown.pixels, self._noise, self._noise_px, rng)
-        parameters = {
-            **shown.parameters,
-            "condition": self._condition,
-            "noise": self._noise,
-            "noise_px": self._noise_px,
-        }
-        return replace(shown, pixels=pixels, parameters=parameters) if pixels.any() else None
+        corruption = {"condition": self._condition, "noise": self._noise, "noise_px": self._noise_px}
+        return replace(shown, pixels=pixels, parameters={**shown.parameters, **corruption}) if pixels.any() else None
 
     def _under_condition(self, view: MaskView, command: Command, rng: np.random.Generator) -> TargetMask | None:
         if self._condition == "zero":
@@ -71,11 +66,7 @@ class CorruptedSource:
 
 
 def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:
-    """Shift a blob inside the picture so that it does not overlap its old place.
-
-    Args:
-        inside: The blob, (H, W) bool.
-        rng: Source of the place.
+    """Shift a blob (H, W) inside the picture so that it does not overlap its old place.
 
     Raises:
         ExcavError: No other place is free for it.
@@ -95,14 +86,7 @@ def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:
 
 
 def noisy_pixels(inside: Pixels, noise: str, size_px: int, rng: np.random.Generator) -> Pixels:
-    """Return a mask with the error of an imperfect segmentation; erosion may leave nothing.
-
-    Args:
-        inside: Right mask, (H, W) bool, not empty.
-        noise: One of `MASK_NOISES`.
-        size_px: Size of the error [px].
-        rng: Source of the direction of a shift.
-    """
+    """Return a mask (H, W) with an error of `MASK_NOISES` and of a size [px]; erosion may leave nothing of it."""
     if noise == "shift":
         angle = rng.uniform(0.0, 2.0 * np.pi)
         rows, cols = np.nonzero(inside)
@@ -111,9 +95,17 @@ def noisy_pixels(inside: Pixels, noise: str, size_px: int, rng: np.random.Genera
         col_shift = np.clip(round(size_px * np.cos(angle)), -cols.min(), width - 1 - cols.max())
         return _shifted(inside, int(row_shift), int(col_shift))
     if noise == "dilate":
-        return _grown(inside, size_px)
+        return grown(inside, size_px)
     # Eroding the mask is dilating its outside; beyond the picture's edge lies neither.
-    return ~_grown(~inside, size_px) if noise == "erode" else inside.copy()
+    return ~grown(~inside, size_px) if noise == "erode" else inside.copy()
+
+
+def grown(inside: Pixels, size_px: int = 1) -> Pixels:
+    """Return a mask with the four neighbours of every pixel added, `size_px` times."""
+    for _ in range(size_px):
+        around = np.pad(inside, 1)
+        inside = inside | around[2:, 1:-1] | around[:-2, 1:-1] | around[1:-1, 2:] | around[1:-1, :-2]
+    return inside
 
 
 def _shifted(inside: Pixels, row_shift: int, col_shift: int) -> Pixels:
@@ -121,15 +113,3 @@ def _shifted(inside: Pixels, row_shift: int, col_shift: int) -> Pixels:
     rows, cols = np.nonzero(inside)
     moved[rows + row_shift, cols + col_shift] = True
     return moved
-
-
-def _grown(inside: Pixels, size_px: int) -> Pixels:
-    """Add the four neighbours of every pixel, `size_px` times."""
-    for _ in range(size_px):
-        grown = inside.copy()
-        grown[1:] |= inside[:-1]
-        grown[:-1] |= inside[1:]
-        grown[:, 1:] |= inside[:, :-1]
-        grown[:, :-1] |= inside[:, 1:]
-        inside = grown
-    return inside

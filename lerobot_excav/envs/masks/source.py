@@ -80,11 +80,7 @@ _SOURCES: dict[str, Callable[[], MaskSource]] = {}
 
 
 def register_mask_source(name: str, make: Callable[[], MaskSource]) -> None:
-    """Make a source known; making the same one known again changes nothing.
-
-    Args:
-        name: Its name in `mask_source` settings.
-        make: Makes it.
+    """Make a source known by its name in `mask_source` settings; making the same one known again changes nothing.
 
     Raises:
         ConfigurationError: Another source has this name.

@@ -14,10 +14,10 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
-from lerobot_excav.envs.tasks.observation import OBS_TYPES, observation_space
 from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.envs.tasks.task import OBS_TYPES
 from lerobot_excav.errors import ConfigurationError, require_choice
 
 RENDER_MODES = ("rgb_array", None)
@@ -77,12 +77,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         self.episode_length = self.settings.episode_length or spec.length_at(self.fps)
         self._max_episode_steps = self.episode_length  # the name by which LeRobot's evaluation asks for it
         self.metadata = {**type(self).metadata, "render_fps": self.fps}
-        self.observation_space = observation_space(
-            obs_type,
-            size=self.settings.observation_size,
-            cameras=spec.cameras,
-            state_size=len(spec.state_names),
-        )
+        self.observation_space = spec.observation_space(obs_type, self.settings.observation_size)
         self.action_space = gym.spaces.Box(
             np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
         )
@@ -205,14 +200,10 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start an episode; see the class for how seed and options select what is played.
+        """Start an episode, and return observation and info; see the class for how seed and options select it.
 
-        Args:
-            seed: Selects scene and target. A corrupted mask and a second target depend on these alone.
-            options: May hold `scene_id`, `target_id` and `commands`, and LeRobot's own keys (`lerobot_…`).
-
-        Returns:
-            Observation and info.
+        A corrupted mask and a second target depend on scene and target alone. LeRobot's own options (`lerobot_…`) are
+        let pass.
 
         Raises:
             ConfigurationError: An option is unknown or has a value that is not possible.
@@ -311,13 +302,9 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
 
     def _wait_for_mask(self) -> tuple[float, bool]:
         """Hold the machine still until there is a mask, within limits; return the reward, and whether it is over."""
-        reward, terminated, patience = 0.0, False, round(MASK_MISSING_LIMIT_S * self.fps)
-        while (
-            self.mask_missing
-            and not terminated
-            and patience > 0
-            and self._frame + self._missing_frames < self.episode_length
-        ):
+        reward, terminated, left = 0.0, False, self.episode_length - self._frame - self._missing_frames
+        patience = min(left, round(MASK_MISSING_LIMIT_S * self.fps))
+        while self.mask_missing and not terminated and patience > 0:
             gain, terminated = self._advance(self._holding_action())
             reward += gain
             patience -= 1

@@ -29,12 +29,7 @@ def register_task(spec: TaskSpec) -> None:
 
 
 def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:
-    """Return a task.
-
-    Args:
-        field: What the user gave its id for.
-        task_id: Its id.
-        env_type: Environment that it has to be of; None: any.
+    """Return the task whose id the user gave for a field, of an environment if one is named.
 
     Raises:
         ConfigurationError: There is no such task.

@@ -34,12 +34,9 @@ def select_episode(
 ) -> Selection:
     """Choose scene, target and changes of the command.
 
-    Args:
-        seed: Seed of the reset; without options it is the scene, and its remainder the target.
-        options: May hold `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of
-            actions carried out before and the target), and LeRobot's own keys, which begin with `lerobot_`.
-        rng: Source of the scene when neither is given.
-        target_count: Targets of a scene.
+    Without options the scene is the seed, or drawn if there is none, and its remainder the target. Options may hold
+    `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of actions carried out before
+    and the target), and LeRobot's own keys, which begin with `lerobot_`.
 
     Raises:
         ConfigurationError: A value is not a whole number or out of range, or an option is unknown.

@@ -30,7 +30,7 @@ class Allowed:
         low: Least value.
         high: Greatest value.
         also: Another type whose values all do, where Python code and not a command line gives them.
-    hint: What to do about a wrong one, added to the message.
+        hint: What to do about a wrong one, added to the message.
         is_column: Whether datasets have a column `excav.<name>` of it.
         changes_start: Whether the same scene starts otherwise under another value.
     """
@@ -92,11 +92,7 @@ def declared_settings(cls: type) -> dict[str, Allowed]:
 
 
 def check_settings(settings: Any, prefix: str = "") -> None:
-    """Check every setting of a dataclass.
-
-    Args:
-        settings: The dataclass.
-        prefix: What the user writes before the name of a field, such as `env.`.
+    """Check every setting of a dataclass, before whose names the user writes a prefix such as `env.`.
 
     Raises:
         ConfigurationError: A value is of another type or not allowed; the message names the field.
@@ -115,7 +111,9 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
         return
     if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
         names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
-        wanted = allowed.words if allowed.values is not None else f"{' or '.join(names)} {allowed.words}"
+        is_beyond = isinstance(value, int | float) and allowed.high is not None and value > allowed.high
+        limits = f"from {allowed.low} to {allowed.high}" if is_beyond else allowed.words
+        wanted = limits if allowed.values is not None else f"{' or '.join(names)} {limits}"
         raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip())
 
 

@@ -9,7 +9,7 @@ from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
 from lerobot_excav.envs.masks.source import mask_source_names
 from lerobot_excav.envs.tasks.setting import check_settings, declared_settings, setting
-from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.errors import require
 
 SCENE_SETS = ("train", "val", "test")
 TARGETS_PER_SCENE = 4
@@ -119,19 +119,12 @@ class TaskSettings:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], *, place: str = "") -> Self:
-        """Make settings of named values.
-
-        Args:
-            values: Values by name.
-            place: Where they stand, for messages.
+        """Make settings of values by name; `place` says in messages where they stand.
 
         Raises:
             ConfigurationError: A name is unknown, or a value is not possible.
         """
         known = declared_settings(cls)
         for name in values:
-            if name not in known:
-                raise ConfigurationError(
-                    f"{place}{name} is not a setting of {cls.ENV_TYPE}; allowed: {', '.join(known)}"
-                )
+            require(name in known, f"{place}{name} is not a setting of {cls.ENV_TYPE}; allowed: {', '.join(known)}")
         return cls(**values)

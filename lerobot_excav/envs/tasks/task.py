@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +13,10 @@ from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE, TaskSettings
 
 if TYPE_CHECKING:
     from lerobot_excav.envs.tasks.measures import TaskMeasures
+
+
+OBS_TYPES = ("pixels_agent_pos", "agent_pos")
+"""With pictures, and without: then no graphics context is made, and a step takes a fraction of the time."""
 
 
 class Operator(Protocol):
@@ -112,6 +117,15 @@ class TaskSpec:
         """Return the target of a scene that is nearest at the start."""
         assert self.nearest_target_entry is not None  # what offers the choice checks it
         return int(resolve_name(self.nearest_target_entry)(scene_set, scene_id))
+
+    def observation_space(self, obs_type: str, size: tuple[int, int]) -> gym.spaces.Dict:
+        """Return the space of observations of one of `OBS_TYPES`; pictures are (height, width) [px]."""
+        joints = gym.spaces.Box(-np.inf, np.inf, (len(self.state_names),), np.float32)
+        spaces: dict[str, gym.Space[Any]] = {"agent_pos": joints}
+        if obs_type == "pixels_agent_pos":
+            image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
+            spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(self.cameras, image))
+        return gym.spaces.Dict(spaces)
 
     def length_at(self, fps: int) -> int:
         """Return the time limit at a frame rate [frames]."""

@@ -81,12 +81,12 @@ def test_pictures_are_copies_and_naming_geoms_leaves_colours_as_they_were(pictur
 
 
 def test_context_is_made_with_the_first_picture_and_freed_by_close(pictures):
-    assert not pictures.is_open
+    assert pictures._context is None
     pictures.colour("above", EVERYTHING)
-    assert pictures.is_open
+    assert pictures._context is not None
     pictures.close()
     pictures.close()
-    assert not pictures.is_open
+    assert pictures._context is None
     for take in (pictures.colour, pictures.distance_m, pictures.geoms):
         with pytest.raises(RenderingError, match="closed"):
             take("above", EVERYTHING)

@@ -29,20 +29,13 @@ class Appearance:
 
 
 def draw_appearance(rng: np.random.Generator) -> Appearance:
-    """Draw the look of a scene around the defaults: a little in colour, more in light.
-
-    Args:
-        rng: Source of randomness.
-    """
+    """Draw the look of a scene around the defaults: a little in colour, more in light."""
     default = Appearance()
     # The sun stays on the camera's side of the zenith, at 35 to 65 degrees, so that slopes always show shading.
     azimuth = rng.uniform(np.radians(0.0), np.radians(100.0))
     elevation = rng.uniform(np.radians(35.0), np.radians(65.0))
-    light_dir_w = (
-        float(np.cos(elevation) * np.cos(azimuth)),
-        float(np.cos(elevation) * np.sin(azimuth)),
-        float(-np.sin(elevation)),
-    )
+    along = np.cos(elevation)
+    light_dir_w = float(along * np.cos(azimuth)), float(along * np.sin(azimuth)), float(-np.sin(elevation))
     return Appearance(
         soil_rgb=_near(rng, default.soil_rgb, 0.08),
         machine_rgb=_near(rng, default.machine_rgb, 0.05),

@@ -1,6 +1,7 @@
 """The looks of the machine, and the shapes with which it collides."""
 
 from itertools import pairwise
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,6 +16,12 @@ _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 WORKING_BIT = 1
 SURROUNDINGS_BIT = 2
 
+_HARD = {"friction": [const.CONTACT_FRICTION, 0.005, 0.0001]}
+STANDING: dict[str, Any] = {"contype": SURROUNDINGS_BIT, "conaffinity": WORKING_BIT, **_HARD}
+WORKING: dict[str, Any] = {"contype": WORKING_BIT, "conaffinity": SURROUNDINGS_BIT, **_HARD}
+UNTOUCHED: dict[str, Any] = {"contype": 0, "conaffinity": 0}
+"""Arguments of `add_geom` for what the working end meets, for the working end itself, and for what is only drawn."""
+
 # Groups of geoms and skins, by which the renderer hides things.
 SURROUNDINGS_GROUP = 0
 MACHINE_GROUP = 1
@@ -24,7 +31,7 @@ HIDDEN_GROUP = 4  # nor is this
 
 Vec = tuple[float, float, float]
 
-MATERIALS: dict[str, tuple[Vec, float]] = {
+_MATERIALS: dict[str, tuple[Vec, float]] = {
     "machine": ((0.96, 0.70, 0.08), 0.25),
     "dark": ((0.16, 0.16, 0.17), 0.1),
     "glass": ((0.22, 0.30, 0.36), 0.6),
@@ -39,7 +46,7 @@ MATERIALS: dict[str, tuple[Vec, float]] = {
 
 def add_materials(spec: mujoco.MjSpec) -> None:
     """Add the materials that geoms name, without any reflection (which would draw the scene twice)."""
-    for name, (rgb, specular) in MATERIALS.items():
+    for name, (rgb, specular) in _MATERIALS.items():
         spec.add_material(name=name, rgba=[*rgb, 1.0], specular=specular, shininess=0.4, reflectance=0.0)
 
 
@@ -47,18 +54,15 @@ def dress_undercarriage(body: mujoco.MjsBody) -> None:
     """Draw crawler tracks, frame and dozer blade; the tracks stop the bucket."""
     for side in (-1.0, 1.0):
         y = 0.88 * side
-        _box(body, (0.0, y, 0.36), (1.05, 0.23, 0.34), "dark", collides=SURROUNDINGS_BIT)
+        _box(body, (0.0, y, 0.36), (1.05, 0.23, 0.34), "dark", stops=True)
         for x in (-1.05, 1.05):
             _cylinder_across(body, (x, y, 0.36), 0.34, 0.23, "dark")
             _cylinder_across(body, (x, y, 0.36), 0.22, 0.25, "machine")
         _box(body, (0.0, y, 0.36), (0.80, 0.25, 0.10), "machine")
         _box(body, (1.55, 0.55 * side, 0.34), (0.30, 0.07, 0.08), "machine")
     _box(body, (0.0, 0.0, 0.45), (0.60, 0.70, 0.16), "machine")
-    _box(body, (1.85, 0.0, 0.28), (0.06, 1.10, 0.24), "machine", collides=SURROUNDINGS_BIT)
-    body.add_geom(
-        type=_CYLINDER, pos=[0.0, 0.0, 0.70], size=[0.55, 0.08, 0.0], material="dark", mass=0.0,
-        group=MACHINE_GROUP, contype=0, conaffinity=0,
-    )  # fmt: skip
+    _box(body, (1.85, 0.0, 0.28), (0.06, 1.10, 0.24), "machine", stops=True)
+    body.add_geom(type=_CYLINDER, pos=[0.0, 0.0, 0.70], size=[0.55, 0.08, 0.0], **_look("dark"), **UNTOUCHED)
 
 
 def dress_house(body: mujoco.MjsBody) -> None:
@@ -114,7 +118,7 @@ def dress_bucket(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     for y in np.linspace(-half_width + 0.04, half_width - 0.04, 4):
         _beam(
             body, tuple(points[0] + 0.5 * under), tuple(points[0] + 0.20 * inward + under), 0.022, 0.04,
-            "steel", y=float(y), collides=0,
+            "steel", y=float(y), collides=False,
         )  # fmt: skip
 
 
@@ -136,19 +140,20 @@ def add_cylinders(spec: mujoco.MjSpec) -> None:
             tendon.wrap_site(site)
 
 
-def _box(body: mujoco.MjsBody, pos: Vec, half_size: Vec, material: str, *, collides: int = 0) -> None:
-    body.add_geom(
-        type=_BOX, pos=list(pos), size=list(half_size), material=material, mass=0.0, group=MACHINE_GROUP,
-        contype=collides, conaffinity=WORKING_BIT if collides else 0,
-    )  # fmt: skip
+def _look(material: str) -> dict[str, Any]:
+    return {"material": material, "mass": 0.0, "group": MACHINE_GROUP}
+
+
+def _box(body: mujoco.MjsBody, pos: Vec, half_size: Vec, material: str, *, stops: bool = False) -> None:
+    """Add a box that stops the working end, or is only drawn."""
+    bits = {"contype": SURROUNDINGS_BIT, "conaffinity": WORKING_BIT} if stops else UNTOUCHED
+    body.add_geom(type=_BOX, pos=list(pos), size=list(half_size), **_look(material), **bits)
 
 
 def _cylinder_across(body: mujoco.MjsBody, pos: Vec, radius: float, half_width: float, material: str) -> None:
     """Draw a cylinder whose axis runs along y."""
-    body.add_geom(
-        type=_CYLINDER, pos=list(pos), size=[radius, half_width, 0.0], quat=[0.5**0.5, 0.5**0.5, 0.0, 0.0],
-        material=material, mass=0.0, group=MACHINE_GROUP, contype=0, conaffinity=0,
-    )  # fmt: skip
+    shape = {"size": [radius, half_width, 0.0], "quat": [0.5**0.5, 0.5**0.5, 0.0, 0.0]}
+    body.add_geom(type=_CYLINDER, pos=list(pos), **shape, **_look(material), **UNTOUCHED)
 
 
 def _beam(
@@ -161,31 +166,26 @@ def _beam(
     *,
     name: str = "",
     y: float = 0.0,
-    collides: int = WORKING_BIT,
+    collides: bool = True,
 ) -> None:
     """Add a box along a line in the x-z plane."""
     start, end = np.array(start_xz), np.array(end_xz)
-    length = float(np.linalg.norm(end - start))
-    angle = float(np.arctan2(end[1] - start[1], end[0] - start[0]))
-    middle = 0.5 * (start + end)
-    body.add_geom(
-        name=name, type=_BOX, pos=[middle[0], y, middle[1]], size=[length / 2, half_width, half_height],
-        quat=[np.cos(angle / 2), 0.0, -np.sin(angle / 2), 0.0], material=material, mass=0.0,
-        group=MACHINE_GROUP, contype=collides, conaffinity=SURROUNDINGS_BIT if collides else 0,
-        friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
-    )  # fmt: skip
+    half_length = 0.5 * float(np.linalg.norm(end - start))
+    half_angle = 0.5 * float(np.arctan2(end[1] - start[1], end[0] - start[0]))
+    x, z = 0.5 * (start + end)
+    shape = {
+        "size": [half_length, half_width, half_height],
+        "quat": [np.cos(half_angle), 0.0, -np.sin(half_angle), 0.0],
+    }
+    kind = WORKING if collides else UNTOUCHED
+    body.add_geom(name=name, type=_BOX, pos=[x, y, z], **shape, **_look(material), **kind)
 
 
 def _add_cheek(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, y: float) -> None:
     """Add a side plate: the convex profile, extruded by the plate's thickness."""
     half_plate = PLATE_THICKNESS_M / 2
     points = [(x, side * half_plate, z) for side in (-1.0, 1.0) for x, z in const.BUCKET_PROFILE_T]
-    mesh = spec.add_mesh(
-        name=name, uservert=np.array(points).ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-    )
-    mesh.smoothnormal = False
-    body.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, pos=[0.0, y, 0.0], material="bucket",
-        mass=0.0, group=MACHINE_GROUP, contype=WORKING_BIT, conaffinity=SURROUNDINGS_BIT,
-        friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
-    )  # fmt: skip
+    convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    spec.add_mesh(name=name, uservert=np.array(points).ravel(), inertia=convex).smoothnormal = False
+    mesh = mujoco.mjtGeom.mjGEOM_MESH
+    body.add_geom(name=name, type=mesh, meshname=name, pos=[0.0, y, 0.0], **_look("bucket"), **WORKING)

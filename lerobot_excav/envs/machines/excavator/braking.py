@@ -54,16 +54,13 @@ def solved(matrix: Array, right: Array) -> Array:
 
 @kernel
 def patch_rows(jacobian: Array, rotation: Array, points_t: Array, axes_t: Array) -> Array:
-    """Return how the joints move the points of the patches along their axes.
+    """Return the speed of the points of the patches along their axes per joint rate, (k, 3, n).
 
     Args:
         jacobian: (6, n) of the tool origin: linear, then angular velocity in the world.
         rotation: (3, 3) of the tool.
         points_t: (k, 3) in the tool frame [m].
         axes_t: (k, 3, 3) normal and two tangents of each patch as rows, in the tool frame.
-
-    Returns:
-        (k, 3, n) rows: speed along an axis per joint rate.
     """
     joints = jacobian.shape[1]
     rows = np.zeros((len(points_t), 3, joints))
@@ -228,7 +225,7 @@ def _braked_velocity(
 def braking_impulse(
     rows: Array, limits: Array, frictions: Array, inertia: Array, free_velocity: Array
 ) -> tuple[Array, Array]:
-    """Return what the soil takes from the joints in one substep.
+    """Return the impulse of the soil on the joints (n,) [N m s] and on each patch along its axes (k, 3) [N s].
 
     Args:
         rows: (k, 3, n) as from `patch_rows`.
@@ -236,9 +233,6 @@ def braking_impulse(
         frictions: (k,) friction coefficients.
         inertia: (n, n) effective inertia of the joints over the substep [kg m2].
         free_velocity: (n,) joint velocities at the end of the substep without soil [rad/s].
-
-    Returns:
-        Impulse on the joints, (n,) [N m s], and on each patch along its axes, (k, 3) [N s].
     """
     smooth = np.zeros(len(limits))
     velocity = _braked_velocity(rows, limits, smooth, inertia, free_velocity, free_velocity)

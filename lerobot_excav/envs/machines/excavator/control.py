@@ -60,17 +60,12 @@ class RateControl:
         self.reference_vel = [0.0] * 4
 
     def step(self, command: Sequence[float], joint_pos: Sequence[float], dt_s: float) -> list[float]:
-        """Advance the reference by one substep and return the servo set points.
+        """Advance the reference by one substep, under rate commands in [-1, 1] at measured joint positions [rad].
 
         Plain floats: four joints are too few for arrays to pay, and this runs in every substep.
 
-        Args:
-            command: Rate commands in [-1, 1], one per joint.
-            joint_pos: Measured joint positions [rad].
-            dt_s: Length of the substep [s].
-
         Returns:
-            Set points [rad]: the reference plus a velocity lead that cancels the servo's damping.
+            Set points of the servos [rad]: the reference plus a velocity lead that cancels the servo's damping.
         """
         set_points = []
         for joint in range(4):

@@ -1,4 +1,4 @@
-"""Digging resistance on the joints: the patches of the soil, solved anew in every substep."""
+"""Digging resistance on the joints: the patches of the soil, solved again in every substep."""
 
 import mujoco
 import numpy as np
@@ -18,9 +18,6 @@ class JointResistance:
     The soil says once per tick what each patch can hold. How much of that acts is decided here in every substep
     (`braking`), from the motion that motors, gravity and inertia would give the joints without soil. The patches
     move with the bucket during the tick.
-
-    Args:
-        model: The compiled machine.
 
     Attributes:
         force_w_n: (3,) force of the soil on the bucket in the last substep [N].

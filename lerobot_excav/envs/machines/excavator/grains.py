@@ -50,11 +50,7 @@ def add_grains(spec: mujoco.MjSpec) -> None:
 
 
 class Grains:
-    """Shows parcels in the skins of a model.
-
-    Args:
-        model: A model with the skins of `add_grains`.
-    """
+    """Shows parcels in the skins that `add_grains` has added to a model."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -66,12 +62,7 @@ class Grains:
         self._shapes = _draw_shapes(np.random.default_rng(_LOOK_SEED)).astype(np.float32)
 
     def show(self, positions_w: NDArray[np.float64], radii_m: NDArray[np.float64]) -> None:
-        """Show these parcels and no others; those beyond `MOST_PARCELS` are left out.
-
-        Args:
-            positions_w: Centres (n, 3) [m], world frame.
-            radii_m: Radii (n,) [m].
-        """
+        """Show the parcels with these centres (n, 3) and radii (n,) [m], the first `MOST_PARCELS`, and no others."""
         count = min(len(positions_w), MOST_PARCELS)
         skins = -(-count // PARCELS_PER_SKIN)
         centres = positions_w[:count].astype(np.float32)

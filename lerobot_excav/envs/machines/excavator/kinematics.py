@@ -13,10 +13,7 @@ _LIMIT_TOLERANCE_RAD = 1e-9  # a pose taken from a joint limit must survive the 
 
 
 def forward(joint_pos: ArrayLike) -> tuple[NDArray[np.float64], float]:
-    """Return where joint angles put the cutting edge.
-
-    Args:
-        joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+    """Return where joint angles (4,) [rad] put the cutting edge.
 
     Returns:
         Position of the middle of the cutting edge in the world, shape (3,) [m], and the pitch of the bucket
@@ -56,7 +53,8 @@ def inverse(radius_m: float, height_m: float, pitch_rad: float, swing_rad: float
     boom = atan2(z, x) - atan2(arm_length * sin(arm), boom_length + arm_length * cos(arm))
     # A boom pin far behind the wrist makes atan2 jump by a turn; the boom itself never leaves +-pi.
     boom = _wrapped(boom)
-    bucket = _in_range(pitch_rad - boom - arm, const.JOINT_RANGE_RAD[3])
+    middle = 0.5 * sum(const.JOINT_RANGE_RAD[3])
+    bucket = middle + _wrapped(pitch_rad - boom - arm - middle)
     joint_pos = np.array([swing_rad, boom, arm, bucket])
     lower, upper = np.array(const.JOINT_RANGE_RAD).T
     outside = np.maximum(lower - joint_pos, joint_pos - upper)
@@ -65,9 +63,3 @@ def inverse(radius_m: float, height_m: float, pitch_rad: float, swing_rad: float
 
 def _wrapped(angle: float) -> float:
     return (angle + pi) % (2 * pi) - pi
-
-
-def _in_range(angle: float, limits: tuple[float, float]) -> float:
-    """Shift an angle by whole turns to within half a turn of the middle of its range."""
-    middle = 0.5 * (limits[0] + limits[1])
-    return middle + _wrapped(angle - middle)

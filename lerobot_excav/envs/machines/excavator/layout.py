@@ -27,14 +27,7 @@ def distance_to_box_footprint_m(points_w: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def cylinder_from_world(point_w: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Express a world point in the machine's cylinder coordinates.
-
-    Args:
-        point_w: Point [m], shape (3,), world frame.
-
-    Returns:
-        Radius from the swing axis [m], swing angle towards the point [rad], height [m].
-    """
+    """Return a world point's radius from the swing axis [m], swing angle towards it [rad] and height [m]."""
     dx, dy = point_w[0] - MACHINE_POS_W[0], point_w[1] - MACHINE_POS_W[1]
     return float(np.hypot(dx, dy)), float(np.arctan2(dy, dx)), float(point_w[2])
 

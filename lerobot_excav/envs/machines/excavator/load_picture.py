@@ -38,11 +38,7 @@ def load_grid() -> NDArray[np.float64]:
 
 
 class LoadPicture:
-    """Lays the skin over the parcels in the bucket.
-
-    Args:
-        model: A model with the skin of `add_load`.
-    """
+    """Lays the skin that `add_load` has added to a model over the parcels in the bucket."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -51,15 +47,7 @@ class LoadPicture:
         self._shell = _shell_depth(self._grid[..., 0])
 
     def show(self, places_t: NDArray[np.float64], radii_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Show a load.
-
-        Args:
-            places_t: Centres of its parcels (n, 3) [m], tool frame.
-            radii_m: Their radii (n,) [m].
-
-        Returns:
-            Which parcels stand out of the skin (n,).
-        """
+        """Show parcels with centres (n, 3) [m], tool frame, and radii (n,) [m]; return which stand out of the skin."""
         self._model.skin_group[self._skin] = LOOSE_SOIL_GROUP if len(places_t) else HIDDEN_GROUP
         if len(places_t) == 0:
             return np.zeros(0, dtype=bool)

@@ -26,13 +26,12 @@ _DIVERGENCE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVE
 class ExcavatorMachine:
     """An excavator on a fixed base, with rate-controlled swing, boom, arm and bucket.
 
-    Args:
-        container: Target box that stands beside the machine.
-
     Attributes:
         model: The compiled MuJoCo model.
         data: Its state.
-        container: The target box.
+        container: The target box beside it.
+        box_contact_force_n: Greatest normal force between machine and target box during the last tick, summed over
+            contacts.
     """
 
     def __init__(self, *, container: Container = TARGET_BOX) -> None:
@@ -46,15 +45,12 @@ class ExcavatorMachine:
         self._bucket = self.model.body("bucket").id
         self._edge_site = self.model.site("cutting_edge").id
         self._is_box_geom = self.model.geom_bodyid == self.model.body("box").id
-        self._box_contact_force_n = 0.0
+        self.box_contact_force_n = 0.0
         self.set_appearance(Appearance())
         self.reset(np.array([0.0, 0.5, -1.8, -0.6]))
 
     def reset(self, joint_pos: NDArray[np.float64]) -> None:
-        """Restart at rest with an empty bucket, independent of everything that happened before.
-
-        Args:
-            joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
+        """Restart at rest in a pose (4,) [rad] with an empty bucket, independent of everything that happened before.
 
         Raises:
             ConfigurationError: Wrong shape, or an angle that is not finite or outside its joint's range.
@@ -66,7 +62,7 @@ class ExcavatorMachine:
         self._payload.reset()
         self._resistance.reset()
         self._control.reset(joint_pos)
-        self._box_contact_force_n = 0.0
+        self.box_contact_force_n = 0.0
         mujoco.mj_forward(self.model, self.data)
 
     def tick(self, action: NDArray[np.float64], reaction: Reaction) -> None:
@@ -84,7 +80,7 @@ class ExcavatorMachine:
         command = checked_action(action).tolist()
         model, data = self.model, self.data
         self._resistance.set_reaction(reaction, data)
-        self._box_contact_force_n = 0.0
+        self.box_contact_force_n = 0.0
         for remaining in range(SUBSTEPS, 0, -1):
             self._payload.approach(reaction.payload_mass_kg, reaction.payload_com_t, remaining)
             data.ctrl[:] = self._control.step(command, data.qpos.tolist(), const.SUBSTEP_S)
@@ -93,7 +89,7 @@ class ExcavatorMachine:
             self._payload.apply_momentum(data)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)
-            self._box_contact_force_n = max(self._box_contact_force_n, self._box_force_now_n())
+            self.box_contact_force_n = max(self.box_contact_force_n, self._box_force_now_n())
         # Step 2 leaves poses and velocities of bodies at the start of the substep: bring them up to date.
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -139,11 +135,6 @@ class ExcavatorMachine:
     def payload_mass_kg(self) -> float:
         """Mass that the bucket carries in the dynamics, which follows the soil's with a ramp [kg]."""
         return self._payload.mass_kg
-
-    @property
-    def box_contact_force_n(self) -> float:
-        """Greatest normal force between machine and target box during the last tick, summed over contacts [N]."""
-        return self._box_contact_force_n
 
     def tool(self) -> Tool:
         """Return the bucket as the soil sees it: geometry, pose and velocity now."""

@@ -6,18 +6,13 @@ import numpy as np
 from lerobot_excav.envs.machines.camera_pictures import add_camera
 from lerobot_excav.envs.machines.excavator import bodywork, cameras, surfaces
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.bodywork import (
-    COLLISION_GROUP,
-    SURROUNDINGS_BIT,
-    SURROUNDINGS_GROUP,
-    WORKING_BIT,
-)
+from lerobot_excav.envs.machines.excavator.bodywork import COLLISION_GROUP, STANDING, SURROUNDINGS_GROUP, UNTOUCHED
 from lerobot_excav.envs.machines.excavator.grains import add_grains
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.load_picture import add_load
 from lerobot_excav.envs.soil.container import Container
 
-GROUND_DROP_M = 0.02
+_GROUND_DROP_M = 0.02
 """The drawn ground lies this far below the real one, so that soil of zero height is not hidden by it."""
 
 _AXIS_UP = (0.0, 0.0, 1.0)
@@ -25,10 +20,7 @@ _AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift
 
 
 def build_spec(container: Container = TARGET_BOX) -> mujoco.MjSpec:
-    """Assemble the model.
-
-    Args:
-        container: Target box; the world frame is that of the soil.
+    """Assemble the model, with a target box; the world frame is that of the soil.
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
@@ -74,25 +66,10 @@ def _add_ground(spec: mujoco.MjSpec) -> None:
     sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
     sky.rgb1, sky.rgb2 = [0.45, 0.62, 0.82], [0.80, 0.84, 0.86]
     sky.width, sky.height = 32, 192
-    world.add_geom(
-        name="ground",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],
-        group=COLLISION_GROUP,
-        contype=SURROUNDINGS_BIT,
-        conaffinity=WORKING_BIT,
-        friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
-    )
-    world.add_geom(
-        name="ground_picture",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[40.0, 40.0, 40.0],
-        pos=[0.0, 0.0, -GROUND_DROP_M],
-        group=SURROUNDINGS_GROUP,
-        contype=0,
-        conaffinity=0,
-        material="ground",
-    )
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    world.add_geom(name="ground", type=plane, size=[0.0, 0.0, 1.0], group=COLLISION_GROUP, **STANDING)
+    picture = world.add_geom(name="ground_picture", type=plane, size=[40.0] * 3, group=SURROUNDINGS_GROUP, **UNTOUCHED)
+    picture.pos, picture.material = [0.0, 0.0, -_GROUND_DROP_M], "ground"
     world.add_light(name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False)
     add_camera(world, "main", cameras.MAIN)
     add_camera(world, "overview", cameras.OVERVIEW)
@@ -105,13 +82,14 @@ def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
     yaw = container.yaw_rad
     quat = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
     body = spec.worldbody.add_body(name="box", pos=list(container.center_w), quat=quat)
+    side, up = thickness / 2, height / 2
     outer_x = half_x + thickness
     panels = {
         "box_floor": ((0.0, 0.0, -0.005), (half_x, half_y, 0.005)),
-        "box_wall_front": ((half_x + thickness / 2, 0.0, height / 2), (thickness / 2, half_y, height / 2)),
-        "box_wall_back": ((-half_x - thickness / 2, 0.0, height / 2), (thickness / 2, half_y, height / 2)),
-        "box_wall_left": ((0.0, half_y + thickness / 2, height / 2), (outer_x, thickness / 2, height / 2)),
-        "box_wall_right": ((0.0, -half_y - thickness / 2, height / 2), (outer_x, thickness / 2, height / 2)),
+        "box_wall_front": ((half_x + side, 0.0, up), (side, half_y, up)),
+        "box_wall_back": ((-half_x - side, 0.0, up), (side, half_y, up)),
+        "box_wall_left": ((0.0, half_y + side, up), (outer_x, side, up)),
+        "box_wall_right": ((0.0, -half_y - side, up), (outer_x, side, up)),
     }
     for name, (pos, size) in panels.items():
         body.add_geom(
@@ -121,10 +99,8 @@ def _add_box(spec: mujoco.MjSpec, container: Container) -> None:
             size=list(size),
             mass=0.0,  # it stands still
             group=SURROUNDINGS_GROUP,
-            contype=SURROUNDINGS_BIT,
-            conaffinity=WORKING_BIT,
-            friction=[const.CONTACT_FRICTION, 0.005, 0.0001],
             material="box_floor" if name == "box_floor" else "box",
+            **STANDING,
         )
 
 
@@ -132,19 +108,10 @@ def _add_machine(spec: mujoco.MjSpec) -> None:
     carrier = spec.worldbody.add_body(name="undercarriage", pos=const.MACHINE_POS_W)
     carrier.mass, carrier.inertia = const.UNDERCARRIAGE_MASS_KG, [1.0, 1.0, 1.0]
     carrier.explicitinertial = True
-    house = _add_link(
-        spec, carrier, 0, (0.0, 0.0, const.SWING_HEIGHT_M),
-        const.HOUSE_MASS_KG, const.HOUSE_COM_S, const.HOUSE_INERTIA_KGM2,
-    )  # fmt: skip
-    boom = _add_link(spec, house, 1, const.BOOM_PIN_S, const.BOOM_MASS_KG, const.BOOM_COM_M, const.BOOM_INERTIA_KGM2)
-    arm = _add_link(
-        spec, boom, 2, (const.BOOM_LENGTH_M, 0.0, 0.0),
-        const.ARM_MASS_KG, const.ARM_COM_M, const.ARM_INERTIA_KGM2,
-    )  # fmt: skip
-    bucket = _add_link(
-        spec, arm, 3, (const.ARM_LENGTH_M, 0.0, 0.0),
-        const.BUCKET_MASS_KG, const.BUCKET_COM_T, const.BUCKET_INERTIA_KGM2,
-    )  # fmt: skip
+    house = _add_link(spec, carrier, 0)
+    boom = _add_link(spec, house, 1)
+    arm = _add_link(spec, boom, 2)
+    bucket = _add_link(spec, arm, 3)
     bucket.add_site(name="cutting_edge", pos=[const.BUCKET_LENGTH_M, 0.0, 0.0], group=5)
     _add_payload(bucket)
     add_camera(house, "cab", cameras.CAB)
@@ -157,21 +124,19 @@ def _add_machine(spec: mujoco.MjSpec) -> None:
     bodywork.add_cylinders(spec)
 
 
-_LINK_NAMES = ("house", "boom", "arm", "bucket")
+_LINKS = (
+    ("house", (0.0, 0.0, const.SWING_HEIGHT_M), const.HOUSE_MASS_KG, const.HOUSE_COM_S, const.HOUSE_INERTIA_KGM2),
+    ("boom", const.BOOM_PIN_S, const.BOOM_MASS_KG, const.BOOM_COM_M, const.BOOM_INERTIA_KGM2),
+    ("arm", (const.BOOM_LENGTH_M, 0.0, 0.0), const.ARM_MASS_KG, const.ARM_COM_M, const.ARM_INERTIA_KGM2),
+    ("bucket", (const.ARM_LENGTH_M, 0.0, 0.0), const.BUCKET_MASS_KG, const.BUCKET_COM_T, const.BUCKET_INERTIA_KGM2),
+)
 
 
-def _add_link(
-    spec: mujoco.MjSpec,
-    parent: mujoco.MjsBody,
-    joint: int,
-    pos: tuple[float, float, float],
-    mass_kg: float,
-    com: tuple[float, float, float],
-    inertia_kgm2: tuple[float, float, float],
-) -> mujoco.MjsBody:
+def _add_link(spec: mujoco.MjSpec, parent: mujoco.MjsBody, joint: int) -> mujoco.MjsBody:
     """Add a body with its joint and its position servo."""
-    body = parent.add_body(name=_LINK_NAMES[joint], pos=pos)
-    body.mass, body.ipos, body.inertia = mass_kg, list(com), list(inertia_kgm2)
+    body_name, pos, mass_kg, com, inertia_kgm2 = _LINKS[joint]
+    body = parent.add_body(name=body_name, pos=pos)
+    body.mass, body.ipos, body.inertia = mass_kg, com, inertia_kgm2
     body.explicitinertial = True
     # The hydraulics carry the links' own weight. The share of each joint counts as actuator torque (actgravcomp)
     # and stays inside its torque limit, so the machine is not stronger for it; payload and soil are not carried.

@@ -60,9 +60,6 @@ class Payload:
     As part of the mass matrix the load takes part in every acceleration. An external force m (g - a) instead
     would lag by a step and go unstable once the load outweighs the bucket.
 
-    Args:
-        model: The compiled machine; its payload body is written to.
-
     Attributes:
         mass_kg: Mass carried now.
     """
@@ -81,13 +78,7 @@ class Payload:
         self._write()
 
     def approach(self, mass_kg: float, com_t: Array, substeps: int) -> None:
-        """Move mass and centre of mass one substep closer to those of the soil.
-
-        Args:
-            mass_kg: Soil in the bucket [kg].
-            com_t: Its centre of mass, tool frame, shape (3,) [m].
-            substeps: How many substeps there are left to arrive, this one included.
-        """
+        """Move mass and centre of mass (3,) [m] closer to the soil's; `substeps` are left to arrive, this included."""
         self._before = (self.mass_kg, self._com_t.copy())
         if mass_kg == self.mass_kg == 0.0:
             return

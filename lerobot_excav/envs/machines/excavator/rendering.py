@@ -40,11 +40,7 @@ class WorksiteRenderer:
         self._without_machine: Any = visible_groups(SURROUNDINGS_GROUP)
 
     def render(self, camera: str) -> NDArray[np.uint8]:
-        """Return a colour picture (H, W, 3), uint8.
-
-        Args:
-            camera: `main`, `cab`, `overview` or `side`.
-        """
+        """Return the colour picture (H, W, 3), uint8, of one of `CAMERAS`."""
         self._soil_picture.update(self._worksite.soil)
         return self._pictures.colour(camera, self._all)
 
@@ -58,10 +54,9 @@ class WorksiteRenderer:
         return self._pictures.pinhole(camera)
 
     def terrain_points_w(self) -> NDArray[np.float64]:
-        """Return the point of the soil surface that every pixel of `main` sees once the machine is gone.
+        """Return the point of the soil surface (H, W, 3) [m] that every pixel of `main` sees once the machine is gone.
 
-        Returns:
-            World points (H, W, 3) [m]; NaN where the pixel shows no soil of the dig area.
+        It is NaN where the pixel shows no soil of the dig area.
         """
         self._soil_picture.update(self._worksite.soil)
         points_w = self._pictures.points_w("main", self._without_machine)

@@ -20,11 +20,7 @@ _LOAD_GRAIN = 0.6
 
 
 class SoilPicture:
-    """Keeps the soil in a machine's model equal to a soil.
-
-    Args:
-        machine: The machine whose model holds the skins.
-    """
+    """Keeps the skins in a machine's model equal to a soil."""
 
     def __init__(self, machine: ExcavatorMachine) -> None:
         self._model: mujoco.MjModel = machine.model
@@ -33,9 +29,7 @@ class SoilPicture:
         self._box_grid = surfaces.box_grid(machine.container)
         self._grains = Grains(machine.model)
         self._load = LoadPicture(machine.model)
-        self._terrain_shown: NDArray[np.float64] | None = None
-        self._box_shown: NDArray[np.float64] | None = None
-        self._loose_shown: NDArray[np.float64] | None = None
+        self._shown: dict[str, NDArray[np.float64]] = {}
 
     def update(self, soil: Soil) -> None:
         """Move the vertices of all skins to where the soil is now, if it has moved."""
@@ -43,11 +37,16 @@ class SoilPicture:
         self._update_box(soil)
         self._update_loose(soil)
 
+    def _is_new(self, part: str, values: NDArray[np.float64]) -> bool:
+        """Tell whether a part of the soil is not what is shown, and note that it will be."""
+        if part in self._shown and np.array_equal(values, self._shown[part]):
+            return False
+        self._shown[part] = values.copy()
+        return True
+
     def _update_terrain(self, soil: Soil) -> None:
-        terrain = soil.heights_m
-        if self._terrain_shown is not None and np.array_equal(terrain, self._terrain_shown):
+        if not self._is_new("terrain", soil.heights_m):
             return
-        self._terrain_shown = terrain.copy()
         # A hair inside the border, beyond which the soil reports bare floor.
         surface = soil.height_at((1.0 - 1e-9) * self._terrain_grid)
         vertices = surfaces.skin_vertices(self._terrain_grid, surface)
@@ -55,9 +54,8 @@ class SoilPicture:
 
     def _update_box(self, soil: Soil) -> None:
         boxed = soil.container_heights_m
-        if boxed is None or (self._box_shown is not None and np.array_equal(boxed, self._box_shown)):
+        if boxed is None or not self._is_new("box", boxed):
             return
-        self._box_shown = boxed.copy()
         surface = _resampled(boxed, self._box_grid.shape[:2])
         # Bare floor shows where there is no soil, instead of two surfaces at one height.
         surface = np.where(surface < _LEAST_BOX_SOIL_M, _HIDDEN_M, surface)
@@ -70,10 +68,9 @@ class SoilPicture:
         positions_w = soil.parcel_positions_w + TICK_S * soil.parcel_velocities_w
         radii, is_load = soil.parcel_radii_m, soil.parcel_is_load
         tool = self._machine.tool()
-        shown = np.concatenate([positions_w.ravel(), is_load, tool.position_w, tool.rotation_w.ravel()])
-        if self._loose_shown is not None and np.array_equal(shown, self._loose_shown):
+        places = np.concatenate([positions_w.ravel(), is_load, tool.position_w, tool.rotation_w.ravel()])
+        if not self._is_new("loose", places):
             return
-        self._loose_shown = shown
         places_t = (positions_w[is_load] - tool.position_w) @ tool.rotation_w
         is_seen = ~is_load
         is_seen[is_load] = self._load.show(places_t, radii[is_load])

@@ -44,15 +44,9 @@ def box_grid(container: Container) -> NDArray[np.float64]:
 def skin_vertices(
     grid: NDArray[np.float64], heights_m: NDArray[np.float64], foot_m: float | NDArray[np.float64] = -_SKIRT_DEPTH_M
 ) -> NDArray[np.float32]:
-    """Return the vertices of a soil skin: the surface, then a skirt that closes its border downwards.
+    """Return the vertices (nx ny + border, 3) of a soil skin: the surface, then a skirt that closes its border below.
 
-    Args:
-        grid: Ground-plane points, shape (nx, ny, 2) [m].
-        heights_m: Heights at those points, shape (nx, ny) [m].
-        foot_m: Height of the skirt's foot, one or (nx, ny) [m].
-
-    Returns:
-        Vertices, shape (nx ny + border, 3).
+    Ground-plane points are (nx, ny, 2), heights (nx, ny), and the height of the skirt's foot one or (nx, ny) [m].
     """
     top = np.concatenate([grid, heights_m[..., None]], axis=-1).reshape(-1, 3)
     border = _border(heights_m.shape)
@@ -94,12 +88,7 @@ def _faces(shape: tuple[int, ...]) -> NDArray[np.int32]:
 def add_sheet(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float64], group: int) -> None:
     """Add a skin of the soil's material: a level sheet with its skirt, which moves with a body.
 
-    Args:
-        spec: The model.
-        name: Name of the skin.
-        body: Name of the body in whose frame the vertices are.
-        grid: Vertices of the sheet, shape (nx, ny, 2) [m], counter-clockwise where they are seen from.
-        group: Drawing group.
+    Its vertices (nx, ny, 2) [m] are in the frame of the body, counter-clockwise where they are seen from.
     """
     shape = grid.shape[:2]
     vertices = skin_vertices(grid, np.zeros(shape))
@@ -108,10 +97,8 @@ def add_sheet(spec: mujoco.MjSpec, name: str, body: str, grid: NDArray[np.float6
     skin.texcoord = (vertices[:, :2] / _TEXTURE_PERIOD_M).ravel().tolist()
     skin.face = _faces(shape).ravel().tolist()
     skin.bodyname = [body]
-    skin.bindpos = [0.0, 0.0, 0.0]
-    skin.bindquat = [1.0, 0.0, 0.0, 0.0]
-    skin.vertid = [list(range(len(vertices)))]
-    skin.vertweight = [[1.0] * len(vertices)]
+    skin.bindpos, skin.bindquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+    skin.vertid, skin.vertweight = [list(range(len(vertices)))], [[1.0] * len(vertices)]
 
 
 def _add_soil_materials(spec: mujoco.MjSpec) -> None:

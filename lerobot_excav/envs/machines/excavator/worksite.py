@@ -9,7 +9,7 @@ from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M, TARGET_BOX
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
-from lerobot_excav.envs.soil import Reaction, Soil, SoilParameters, Tool
+from lerobot_excav.envs.soil import Reaction, Soil, SoilParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,14 +58,7 @@ class Worksite:
         self._ticks = 0
 
     def tick(self, action: NDArray[np.float64]) -> Reaction:
-        """Advance by `TICK_S` under joystick commands.
-
-        Args:
-            action: Swing, boom, arm, bucket in [-1, 1], shape (4,).
-
-        Returns:
-            What the soil did to the bucket during the tick.
-        """
+        """Advance by `TICK_S` under joystick commands (4,) in [-1, 1], and return what the soil did to the bucket."""
         reaction = self.soil.step(TICK_S, self.machine.tool())
         self.machine.tick(action, reaction)
         self._ticks += 1
@@ -75,13 +68,3 @@ class Worksite:
     def time_s(self) -> float:
         """Time since the reset [s]."""
         return self._ticks * TICK_S
-
-    @property
-    def tool(self) -> Tool:
-        """The bucket as the soil sees it."""
-        return self.machine.tool()
-
-    @property
-    def box_mass_kg(self) -> float:
-        """Soil in the target box [kg]."""
-        return self.soil.box_mass_kg

@@ -26,15 +26,7 @@ _LINK_SHAPES = (
 
 
 def add_arm(spec: mujoco.MjSpec, base_pos_w: tuple[float, float, float]) -> mujoco.MjsBody:
-    """Add the arm with its joints and position servos.
-
-    Args:
-        spec: Model that grows.
-        base_pos_w: Foot of the arm [m].
-
-    Returns:
-        The last link, with the site `flange`.
-    """
+    """Add the arm with its joints and position servos on its foot [m]; return the last link, with the site `flange`."""
     body = spec.worldbody.add_body(name="base", pos=base_pos_w)
     for i, name in enumerate(const.JOINT_NAMES):
         body = _add_link(body, i, name)

@@ -11,21 +11,11 @@ _ROD_LENGTH_M = const.PAD_CENTRE_M - 0.5 * const.PAD_LENGTH_M - const.HAND_LENGT
 
 
 def add_gripper(spec: mujoco.MjSpec, wrist: mujoco.MjsBody) -> None:
-    """Add hand, fingers, the actuator `gripper` and the site `grasp` between the pads.
-
-    Args:
-        spec: Model that grows.
-        wrist: Last link of the arm.
-    """
+    """Add hand, fingers, the actuator `gripper` and the site `grasp` between the pads to the last link of an arm."""
     hand = wrist.add_body(name="hand", pos=[0.0, 0.0, const.FLANGE_OFFSET_M], gravcomp=1.0)
-    hand.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        fromto=[0, 0, 0, 0, 0, const.HAND_LENGTH_M],
-        size=[const.HAND_RADIUS_M, 0, 0],
-        mass=const.HAND_MASS_KG,
-        rgba=_HAND_RGBA,
-        **ARM.arguments,
-    )
+    shape = {"fromto": [0, 0, 0, 0, 0, const.HAND_LENGTH_M], "size": [const.HAND_RADIUS_M, 0, 0]}
+    cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
+    hand.add_geom(type=cylinder, mass=const.HAND_MASS_KG, rgba=_HAND_RGBA, **shape, **ARM.arguments)
     hand.add_site(name="grasp", pos=[0.0, 0.0, const.PAD_CENTRE_M], group=5)
     for finger, side in enumerate((1.0, -1.0)):
         _add_finger(hand, finger, side)
@@ -37,48 +27,25 @@ def _add_finger(hand: mujoco.MjsBody, finger: int, side: float) -> None:
     """Add a finger that slides along +x or -x of the hand; at zero its pad's face lies in the middle."""
     name = const.FINGER_NAMES[finger]
     body = hand.add_body(name=name, gravcomp=1.0)
-    body.add_joint(
-        name=name,
-        type=mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=[side, 0, 0],
-        range=[0.0, const.FINGER_STROKE_M],
-        armature=0.05,  # [kg], the motor seen through its gear (kind: guess)
+    joint = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[side, 0, 0])
+    joint.range = [0.0, const.FINGER_STROKE_M]
+    joint.armature = 0.05  # [kg], the motor seen through its gear (kind: guess)
+    x, box = side * 0.5 * const.PAD_THICKNESS_M, mujoco.mjtGeom.mjGEOM_BOX
+    half_x, half_y = 0.5 * const.PAD_THICKNESS_M, 0.5 * const.PAD_WIDTH_M[finger]
+    pad = body.add_geom(
+        name=f"{name}_pad", type=box, mass=const.FINGER_MASS_KG[finger], rgba=_PAD_RGBA, **ARM.arguments
     )
-    x = side * 0.5 * const.PAD_THICKNESS_M
-    half_size = [0.5 * const.PAD_THICKNESS_M, 0.5 * const.PAD_WIDTH_M[finger], 0.5 * const.PAD_LENGTH_M]
-    body.add_geom(
-        name=f"{name}_pad",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=[x, 0.0, const.PAD_CENTRE_M],
-        size=half_size,
-        mass=const.FINGER_MASS_KG[finger],
-        rgba=_PAD_RGBA,
-        friction=const.PAD_FRICTION,
-        condim=4,
-        priority=1,  # rubber decides the friction of what it touches
-        solref=HARD_SOLREF,
-        **ARM.arguments,
-    )
-    body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=[x, 0.0, const.HAND_LENGTH_M + 0.5 * _ROD_LENGTH_M],
-        size=[half_size[0], half_size[1], 0.5 * _ROD_LENGTH_M],
-        mass=0,
-        rgba=_HAND_RGBA,
-        **ARM.arguments,
-    )
+    pad.pos, pad.size = [x, 0.0, const.PAD_CENTRE_M], [half_x, half_y, 0.5 * const.PAD_LENGTH_M]
+    pad.friction, pad.condim, pad.solref = const.PAD_FRICTION, 4, HARD_SOLREF
+    pad.priority = 1  # rubber decides the friction of what it touches
+    rod = body.add_geom(type=box, size=[half_x, half_y, 0.5 * _ROD_LENGTH_M], mass=0, rgba=_HAND_RGBA, **ARM.arguments)
+    rod.pos = [x, 0.0, const.HAND_LENGTH_M + 0.5 * _ROD_LENGTH_M]
 
 
 def _couple_fingers(spec: mujoco.MjSpec) -> None:
     wide, narrow = const.FINGER_NAMES
-    spec.add_equality(
-        type=mujoco.mjtEq.mjEQ_JOINT,
-        name1=narrow,
-        name2=wide,
-        data=[0.0, 1.0, *[0.0] * 10],
-        objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        solref=HARD_SOLREF,
-    )
+    tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=narrow, name2=wide, solref=HARD_SOLREF)
+    tie.objtype, tie.data = mujoco.mjtObj.mjOBJ_JOINT, [0.0, 1.0, *[0.0] * 10]
 
 
 def _add_motor(spec: mujoco.MjSpec) -> None:

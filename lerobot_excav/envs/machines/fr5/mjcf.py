@@ -1,5 +1,7 @@
 """The MuJoCo model of the work cell: table, tray, blocks, arm and gripper."""
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -12,6 +14,7 @@ from lerobot_excav.envs.machines.fr5.gripper import add_gripper
 
 _TRAY_RGBA = (0.35, 0.37, 0.40, 1.0)
 _RIM_PIECES = 16
+_HARD_CELL: dict[str, Any] = {"solref": HARD_SOLREF, **CELL.arguments}
 
 
 def build_model() -> mujoco.MjModel:
@@ -56,49 +59,25 @@ def _set_options(spec: mujoco.MjSpec) -> None:
 
 def _add_table(spec: mujoco.MjSpec) -> None:
     # No highlights: on a bare table they are brighter than any block, and wander with the camera.
-    spec.worldbody.add_light(
-        name="lamp",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0, 0, 3],
-        dir=[0, 0, -1],
-        specular=[0, 0, 0],
-        ambient=[0.25, 0.25, 0.25],
-    )
+    lamp = spec.worldbody.add_light(name="lamp", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    lamp.pos, lamp.dir, lamp.specular, lamp.ambient = [0, 0, 3], [0, 0, -1], [0, 0, 0], [0.25, 0.25, 0.25]
     spec.visual.headlight.active = 0
-    spec.worldbody.add_geom(
-        name="table",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[3.0, 3.0, 0.1],
-        rgba=[0.6, 0.6, 0.6, 1.0],
-        solref=HARD_SOLREF,
-        **CELL.arguments,
-    )
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name="table", type=plane, size=[3.0, 3.0, 0.1], rgba=[0.6, 0.6, 0.6, 1.0], **_HARD_CELL)
 
 
 def _add_tray(spec: mujoco.MjSpec) -> None:
     x, y = layout.TRAY_POS_W
-    half = 0.5 * layout.TRAY_HEIGHT_M
+    radius, half = layout.TRAY_RADIUS_M, 0.5 * layout.TRAY_HEIGHT_M
+    look = {"rgba": _TRAY_RGBA, **_HARD_CELL}
     tray = spec.worldbody.add_body(name="tray", pos=[x, y, 0.0])
-    tray.add_geom(
-        name="tray",
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        pos=[0, 0, half],
-        size=[layout.TRAY_RADIUS_M, half, 0],
-        rgba=_TRAY_RGBA,
-        solref=HARD_SOLREF,
-        **CELL.arguments,
-    )
-    radius = layout.TRAY_RADIUS_M
+    tray.add_geom(name="tray", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=[0, 0, half], size=[radius, half, 0], **look)
+    half_rim = half + 0.5 * layout.TRAY_RIM_M
     for angle in 2 * np.pi * np.arange(_RIM_PIECES) / _RIM_PIECES:
-        tray.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[radius * np.cos(angle), radius * np.sin(angle), half + 0.5 * layout.TRAY_RIM_M],
-            size=[0.003, radius * np.tan(np.pi / _RIM_PIECES), half + 0.5 * layout.TRAY_RIM_M],
-            quat=[np.cos(0.5 * angle), 0, 0, np.sin(0.5 * angle)],
-            rgba=_TRAY_RGBA,
-            solref=HARD_SOLREF,
-            **CELL.arguments,
-        )
+        piece = tray.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, **look)
+        piece.pos = [radius * np.cos(angle), radius * np.sin(angle), half_rim]
+        piece.size = [0.003, radius * np.tan(np.pi / _RIM_PIECES), half_rim]
+        piece.quat = [np.cos(0.5 * angle), 0, 0, np.sin(0.5 * angle)]
 
 
 def _add_block(spec: mujoco.MjSpec, i: int) -> None:
@@ -106,13 +85,5 @@ def _add_block(spec: mujoco.MjSpec, i: int) -> None:
     # Where no scene puts it yet: side by side, so that the model's own initial state is one without contact forces.
     block = spec.worldbody.add_body(name=f"block{i}", pos=[0.1, 0.3 + 0.1 * i, half])
     block.add_freejoint(name=f"block{i}")
-    block.add_geom(
-        name=f"block{i}",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[half, half, half],
-        mass=layout.BLOCK_MASS_KG,
-        friction=layout.BLOCK_FRICTION,
-        condim=4,
-        solref=HARD_SOLREF,
-        **BLOCK.arguments,
-    )
+    cube = block.add_geom(name=f"block{i}", type=mujoco.mjtGeom.mjGEOM_BOX, size=[half] * 3, **BLOCK.arguments)
+    cube.mass, cube.friction, cube.condim, cube.solref = layout.BLOCK_MASS_KG, layout.BLOCK_FRICTION, 4, HARD_SOLREF

@@ -15,6 +15,9 @@ _MAX_GEOMS = 100
 class WorkcellRenderer:
     """Draws a work cell into images; the graphics context is made with the first picture.
 
+    Every method that draws raises `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics
+    context can be made or the renderer was closed.
+
     Args:
         workcell: The cell; its current state is drawn.
         height: Image height H [px].
@@ -31,22 +34,11 @@ class WorkcellRenderer:
         self._block_geoms = np.array([model.geom(f"block{i}").id for i in range(layout.BLOCK_COUNT)])
 
     def render(self, camera: str) -> NDArray[np.uint8]:
-        """Return a colour picture (H, W, 3), uint8.
-
-        Args:
-            camera: One of `layout.CAMERAS`.
-
-        Raises:
-            ConfigurationError: There is no such camera.
-            RenderingError: No graphics context can be made, or the renderer was closed.
-        """
+        """Return the colour picture (H, W, 3), uint8, of one of `layout.CAMERAS`."""
         return self._pictures.colour(camera, self._all)
 
     def depth_m(self, camera: str) -> NDArray[np.float32]:
-        """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is.
-
-        Arguments and errors are those of `render`.
-        """
+        """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is."""
         return self._pictures.distance_m(camera, self._all).astype(np.float32)
 
     def camera(self, camera: str) -> PinholeCamera:
@@ -54,11 +46,7 @@ class WorkcellRenderer:
         return self._pictures.pinhole(camera)
 
     def block_pixels(self) -> NDArray[np.bool_]:
-        """Return the pixels of `main` that show each block once the arm is gone, (4, H, W) bool.
-
-        Raises:
-            RenderingError: No graphics context can be made, or the renderer was closed.
-        """
+        """Return the pixels of `main` that show each block once the arm is gone, (4, H, W) bool."""
         shown = self._pictures.geoms("main", self._without_arm)
         return np.asarray(shown == self._block_geoms[:, None, None])
 

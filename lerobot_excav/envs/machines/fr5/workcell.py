@@ -164,11 +164,8 @@ class Workcell:
 
     def arm_touching(self) -> NDArray[np.bool_]:
         """Return which blocks any part of arm or gripper touches, (4,)."""
-        touching = np.zeros(layout.BLOCK_COUNT, dtype=bool)
-        for part, block in self._block_contacts():
-            if self.model.geom_group[part] == ARM.group:
-                touching[block] = True
-        return touching
+        touched = [block for part, block in self._block_contacts() if self.model.geom_group[part] == ARM.group]
+        return np.isin(range(layout.BLOCK_COUNT), touched)
 
     def _block_contacts(self) -> Iterator[tuple[int, int]]:
         """Yield every contact of a block: the geom that touches it, and the block's index."""

@@ -9,11 +9,7 @@ from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
 
 
 def nearest_block(scene: GraspScene) -> int:
-    """Return the index of the block that lies nearest to the grasp point at the start, in the plane of the table.
-
-    Args:
-        scene: The scene.
-    """
+    """Return the index of the block that lies nearest to the grasp point at the start, in the plane of the table."""
     offset_w = scene.block_pos_w[:, :2] - grasp_pos_w(scene.joint_pos)[:2]
     return int(np.argmin(np.hypot(*offset_w.T)))
 
@@ -24,27 +20,19 @@ def nearest_target(scene_set: str, scene_id: int) -> int:
 
 
 def grasp_pos_w(joint_pos: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where the grasp point is, by the chain of the joints' frames.
-
-    Args:
-        joint_pos: Joint positions [rad], (6,).
-
-    Returns:
-        Position [m], (3,), world frame.
-    """
+    """Return where joint positions (6,) [rad] put the grasp point (3,) [m], world frame, by the chain of frames."""
     pos_w = np.array(BASE_POS_W)
     axes_w = np.eye(3)
     for placement, angle in zip(const.JOINT_PLACEMENTS, joint_pos, strict=True):
         pos_w = pos_w + axes_w @ placement.xyz
-        axes_w = axes_w @ _turn_x(placement.roll) @ _turn_z(angle)
+        axes_w = axes_w @ _turn(0, placement.roll) @ _turn(2, angle)
     return pos_w + axes_w[:, 2] * (const.FLANGE_OFFSET_M + const.PAD_CENTRE_M)
 
 
-def _turn_x(angle: float) -> NDArray[np.float64]:
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
-
-
-def _turn_z(angle: float) -> NDArray[np.float64]:
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+def _turn(axis: int, angle: float) -> NDArray[np.float64]:
+    """Return the rotation about a coordinate axis."""
+    turned = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turned[[i, j], [i, j]] = np.cos(angle)
+    turned[j, i], turned[i, j] = np.sin(angle), -np.sin(angle)
+    return turned

@@ -76,8 +76,7 @@ def draw_scene(scene_set: str, scene_id: int) -> GraspScene:
 
 def _draw_block_pos_w(rng: np.random.Generator) -> NDArray[np.float64]:
     """Draw places until no two blocks are closer than the least spacing."""
-    low = [layout.BLOCK_AREA_X_W[0], layout.BLOCK_AREA_Y_W[0]]
-    high = [layout.BLOCK_AREA_X_W[1], layout.BLOCK_AREA_Y_W[1]]
+    low, high = np.transpose([layout.BLOCK_AREA_X_W, layout.BLOCK_AREA_Y_W])
     for _ in range(_PLACING_TRIES):
         xy_w = rng.uniform(low, high, size=(layout.BLOCK_COUNT, 2))
         distance = np.linalg.norm(xy_w[:, None] - xy_w[None], axis=-1)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
-from lerobot_excav.errors import require
 
 LIFT_M = 0.02
 """Height above its place on the table from which a block counts as lifted [m] (kind: guess, half its edge)."""
@@ -34,32 +33,22 @@ class GraspTask:
     The published experiment has the same maximum; its policies return 658 (96 % success) and 704 (50 of 50). The
     scripted operator's 400 frames return about 900 here, because it rests longer at the end.
 
-    Attributes:
-        target_id: Index of the block that is commanded now.
-
     Args:
         workcell: Arm and blocks, at the start of a scene.
-        target_id: Index of the commanded block.
+        target_id: Index of the commanded block; also an attribute, which `retarget` changes.
     """
 
     def __init__(self, workcell: Workcell, target_id: int) -> None:
         self._workcell = workcell
-        self.target_id = _checked_target(target_id)
+        self.target_id = target_id
         self._first_grasped = layout.NO_BLOCK
         self._return = 0.0
         self._max_reward = 0.0
         self._look()
 
     def retarget(self, target_id: int) -> None:
-        """Command another block from now on; which block is grasped first is asked again.
-
-        Args:
-            target_id: Index of the block.
-
-        Raises:
-            ConfigurationError: There is no such block.
-        """
-        self.target_id = _checked_target(target_id)
+        """Command another block from now on; which block is grasped first is asked again."""
+        self.target_id = target_id
         self._first_grasped = layout.NO_BLOCK
 
     def update(self) -> float:
@@ -129,13 +118,5 @@ class GraspTask:
         if self._in_tray[target]:
             return 4.0
         if self._lifted[target]:
-            return 3.0 if layout.over_tray(self._block_pos_w[target]) else 2.0
+            return 3.0 if self._over_tray[target] else 2.0
         return 1.0 if self._touching[:, target].all() else 0.0
-
-
-def _checked_target(target_id: int) -> int:
-    require(
-        0 <= target_id < layout.BLOCK_COUNT,
-        f"target_id={target_id} is not possible; the blocks are numbered 0 to {layout.BLOCK_COUNT - 1}",
-    )
-    return target_id

@@ -7,8 +7,9 @@ from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.tasks.scoop.scene import Scene
+from lerobot_excav.envs.tasks.scoop.spec import TaskState
 from lerobot_excav.envs.tasks.scoop.targets import Target
-from lerobot_excav.envs.tasks.scoop.task_state import TaskMeter, TaskState
+from lerobot_excav.envs.tasks.scoop.task_state import TaskMeter
 
 LOADING_ONSET_KG = 20.0
 """Payload at which a bucket counts as loading, and below which it counts as emptied [kg]."""

@@ -1,5 +1,6 @@
 """The excavator as a gymnasium environment."""
 
+from dataclasses import astuple
 from typing import Any, cast
 
 import numpy as np
@@ -127,8 +128,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     @property
     def task_state(self) -> NDArray[np.float32]:
-        """Measurements of the cycle, (8,) float32; see `spec.TASK_STATE_NAMES`."""
-        return self.cycle.state.as_array()
+        """Measurements of the cycle, (8,) float32; see `spec.TaskState`."""
+        return np.array(astuple(self.cycle.state), np.float32)
 
     @property
     def is_success(self) -> bool:

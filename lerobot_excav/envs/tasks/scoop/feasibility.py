@@ -32,13 +32,8 @@ def feasible_centers_w(
 ) -> NDArray[np.float64]:
     """Return the centres of all feasible dig regions on a 10 cm raster of the dig area.
 
-    Args:
-        heights_m: Soil surface above the floor [m], shape (nx, ny).
-        x_w: Cell centres along x [m], shape (nx,).
-        y_w: Cell centres along y [m], shape (ny,), same spacing.
-
-    Returns:
-        Points on the soil surface [m], shape (n, 3), world frame; n may be 0.
+    The soil surface has heights (nx, ny) above the floor at cell centres (nx,) and (ny,) of one spacing [m]. The
+    centres lie on it, (n, 3) [m], world frame; n may be 0.
     """
     cell_size_m = float(x_w[1] - x_w[0])
     step = max(1, round(_RASTER_M / cell_size_m))

@@ -22,7 +22,7 @@ def draw_pile(
     repose_tan: float,
     density_kg_m3: float,
 ) -> NDArray[np.float64]:
-    """Draw one pile at rest on the floor.
+    """Draw one pile at rest, as heights above the floor (nx, ny) [m].
 
     Args:
         rng: Source of the shape and the mass.
@@ -30,9 +30,6 @@ def draw_pile(
         y_w: Cell centres along y [m], shape (ny,), same spacing.
         repose_tan: Steepest slope at which the soil rests.
         density_kg_m3: Bulk density [kg/m3].
-
-    Returns:
-        Heights above the floor [m], shape (nx, ny).
     """
     cell_size_m = float(x_w[1] - x_w[0])
     volume_m3 = rng.uniform(*PILE_MASS_RANGE_KG) / density_kg_m3

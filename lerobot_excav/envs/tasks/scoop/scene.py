@@ -57,9 +57,6 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "s
         scene_id: Any integer from 0.
         soil: Name of the soil preset, or parameters, which set slope and density of the pile.
 
-    Returns:
-        The scene.
-
     Raises:
         ConfigurationError: An argument is not one of the allowed values.
     """

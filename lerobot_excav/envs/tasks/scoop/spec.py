@@ -1,20 +1,27 @@
 """Scoop-v0 as data."""
 
+from dataclasses import dataclass, fields
+
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
-TASK_STATE_NAMES = (
-    "bucket_mass_kg",
-    "excavated_mass_kg",
-    "deposited_mass_kg",
-    "distance_to_target_m",
-    "distance_to_box_m",
-    "hard_target_contacts",
-    "bucket_depth_below_dig_plane_m",
-    "spill_before_target_events",
-)
-"""Entries of `task_state`; docs/reference defines them."""
+
+@dataclass(kw_only=True)
+class TaskState:
+    """Running measurements of one cycle, the entries of `task_state`; docs/reference defines them."""
+
+    bucket_mass_kg: float = 0.0
+    excavated_mass_kg: float = 0.0
+    deposited_mass_kg: float = 0.0
+    distance_to_target_m: float = 0.0
+    distance_to_box_m: float = 0.0
+    hard_target_contacts: int = 0
+    bucket_depth_below_dig_plane_m: float = 0.0
+    spill_before_target_events: int = 0
+
+
+TASK_STATE_NAMES = tuple(field.name for field in fields(TaskState))
 
 SCOOP = TaskSpec(
     id="Scoop-v0",

@@ -35,14 +35,7 @@ class Target:
     size_m: float = PATCH_SIZE_M
 
     def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points lie above, on or below the patch.
-
-        Args:
-            points_w: Points [m], shape (..., 2) or (..., 3), world frame; NaN is outside.
-
-        Returns:
-            Booleans, shape (...).
-        """
+        """Tell which points (..., 2) or (..., 3) [m], world frame, lie above, on or below the patch; NaN is outside."""
         offset = points_w[..., :2] - self.center_w[:2]
         cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         along = offset[..., 0] * cos + offset[..., 1] * sin
@@ -55,14 +48,7 @@ def find_targets(
 ) -> tuple[Target, ...]:
     """Pick dig regions that are reachable and in view, hold enough soil and lie apart from each other.
 
-    Args:
-        heights_m: Soil surface above the floor [m], shape (nx, ny).
-        x_w: Cell centres along x [m], shape (nx,).
-        y_w: Cell centres along y [m], shape (ny,).
-        rng: Source of the choice among the feasible regions.
-
-    Returns:
-        The targets in an order that tells nothing of their places.
+    The soil is that of `feasible_centers_w`. The order of the targets tells nothing of their places.
 
     Raises:
         TooFewTargetsError: The pile offers fewer than `TARGETS_PER_SCENE` such regions.

@@ -1,14 +1,12 @@
 """Task state: what is measured at every tick to judge a cycle. Never an input of a policy."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX, distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import Tool
-from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
+from lerobot_excav.envs.tasks.scoop.spec import TaskState
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
 # Thresholds of the events (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
@@ -17,24 +15,6 @@ SPILL_LEAST_PAYLOAD_KG = 50.0
 SPILL_LEAST_DROP_KG = 5.0
 SPILL_BOX_GAIN_KG = 2.0
 FOOTPRINT_FADE_M = 0.25
-
-
-@dataclass(kw_only=True)
-class TaskState:
-    """Running measurements of one cycle; the fields are `TASK_STATE_NAMES`, in their order."""
-
-    bucket_mass_kg: float = 0.0
-    excavated_mass_kg: float = 0.0
-    deposited_mass_kg: float = 0.0
-    distance_to_target_m: float = 0.0
-    distance_to_box_m: float = 0.0
-    hard_target_contacts: int = 0
-    bucket_depth_below_dig_plane_m: float = 0.0
-    spill_before_target_events: int = 0
-
-    def as_array(self) -> NDArray[np.float32]:
-        """Return the values in the order of `TASK_STATE_NAMES`, shape (8,), float32."""
-        return np.array([getattr(self, name) for name in TASK_STATE_NAMES], dtype=np.float32)
 
 
 class TaskMeter:
@@ -48,7 +28,7 @@ class TaskMeter:
     def __init__(self, worksite: Worksite, target: Target) -> None:
         self._worksite = worksite
         self._target = target
-        self._box_mass_start_kg = worksite.box_mass_kg
+        self._box_mass_start_kg = worksite.soil.box_mass_kg
         self._in_hard_contact = False
         self.state = TaskState()
         self._measure_places()
@@ -60,13 +40,10 @@ class TaskMeter:
 
     def update(self) -> TaskState:
         """Take in the tick that has just passed and return the state."""
-        state, previous_bucket_kg, previous_box_kg = (
-            self.state,
-            self.state.bucket_mass_kg,
-            self.state.deposited_mass_kg,
-        )
+        state = self.state
+        previous_bucket_kg, previous_box_kg = state.bucket_mass_kg, state.deposited_mass_kg
         state.bucket_mass_kg = self._worksite.soil.payload_mass_kg
-        state.deposited_mass_kg = max(0.0, self._worksite.box_mass_kg - self._box_mass_start_kg)
+        state.deposited_mass_kg = max(0.0, self._worksite.soil.box_mass_kg - self._box_mass_start_kg)
         # Soil that leaves the bucket and enters it again counts twice, as in the definition this follows.
         state.excavated_mass_kg += max(0.0, state.bucket_mass_kg - previous_bucket_kg)
         drop_kg = previous_bucket_kg - state.bucket_mass_kg
@@ -102,7 +79,7 @@ class TaskMeter:
         edge_w = self._worksite.machine.cutting_edge_pos_w
         self.state.distance_to_target_m = float(np.linalg.norm(edge_w - self._target.center_w))
         self.state.distance_to_box_m = distance_to_box_m(edge_w)
-        self.state.bucket_depth_below_dig_plane_m = depth_below_dig_plane_m(self._worksite.tool)
+        self.state.bucket_depth_below_dig_plane_m = depth_below_dig_plane_m(self._worksite.machine.tool())
 
 
 def distance_to_box_m(point_w: NDArray[np.float64]) -> float:

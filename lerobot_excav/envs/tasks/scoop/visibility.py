@@ -20,23 +20,14 @@ def seen_area_px(
     A surface element of vector area A at v before the eye covers f² (A · v) / d³ of a picture of focal length f, where
     d is the depth of the element along the optical axis (perspective projection).
 
-    Args:
-        heights_m: Soil surface [m], shape (nx, ny).
-        x_w: Cell centres along x [m], shape (nx,).
-        y_w: Cell centres along y [m], shape (ny,), same spacing.
-        pose: A camera that is fixed to the world.
-        picture_height_px: Height of the picture.
-
-    Returns:
-        Areas [px], shape (nx, ny): zero for cells that face away, or that other soil hides. The borders of the picture
-        are not regarded.
+    The soil is that of `feasible_centers_w`, the camera fixed to the world, its picture so many pixels high. The areas
+    (nx, ny) [px] are zero for cells that face away, or that other soil hides. The borders of the picture are not
+    regarded.
     """
     cell_size_m = float(x_w[1] - x_w[0])
     eye_w = np.asarray(pose.position)
     slope_x, slope_y = np.gradient(heights_m, cell_size_m)
-    to_eye = np.stack(
-        np.broadcast_arrays(eye_w[0] - x_w[:, None], eye_w[1] - y_w[None, :], eye_w[2] - heights_m), axis=-1
-    )
+    to_eye = eye_w - np.stack(np.broadcast_arrays(x_w[:, None], y_w[None, :], heights_m), axis=-1)
     area_vector = cell_size_m**2 * np.stack([-slope_x, -slope_y, np.ones_like(heights_m)], axis=-1)
     depth_m = to_eye @ pose.axes[:, 2]
     focal_px = 0.5 * picture_height_px / np.tan(0.5 * np.radians(pose.fovy_deg))
@@ -49,19 +40,10 @@ def seen_area_px(
 def hidden_cells(
     heights_m: NDArray[np.float64], x0_w: float, y0_w: float, cell_size_m: float, eye_w: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell which cells other soil hides from an eye above the field.
+    """Tell which cells (nx, ny) of a field other soil hides from an eye (3,) [m], which is higher than all soil.
 
-    The surface is bilinear between cell centres; lines of sight are followed in steps of half a cell.
-
-    Args:
-        heights_m: Soil surface [m], shape (nx, ny).
-        x0_w: First cell centre along x [m].
-        y0_w: First cell centre along y [m].
-        cell_size_m: Spacing of the cell centres.
-        eye_w: The eye [m], shape (3,); higher than all soil.
-
-    Returns:
-        Booleans, shape (nx, ny).
+    The surface is bilinear between cell centres, the first of which is at `x0_w`, `y0_w`; lines of sight are followed
+    in steps of half a cell.
     """
     nx, ny = heights_m.shape
     highest = heights_m.max()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.excavator import constants as const
-from lerobot_excav.envs.machines.excavator.layout import MACHINE_POS_W
 
 LINKS = ("house", "boom", "arm", "bucket")
 
@@ -27,17 +26,15 @@ def test_compiled_links_have_the_masses_and_inertias_of_the_constants(compiled, 
     axes = rotation.reshape(3, 3)
     inertia = np.diag(getattr(const, f"{name}_INERTIA_KGM2"))
     np.testing.assert_allclose(axes @ np.diag(link.inertia) @ axes.T, inertia, atol=1e-6)
-
-
-def test_compiled_machine_weighs_as_much_as_its_class(compiled):
-    total = compiled.body_mass.sum() - compiled.body("payload").mass[0]
-    assert total == const.UNDERCARRIAGE_MASS_KG + 4300 + 520 + 270 + 210
-    assert 7.5e3 < total < 8.7e3
+    assert 7.5e3 < compiled.body_mass.sum() < 8.7e3  # the 8-t class
 
 
 def test_compiled_joints_have_the_order_ranges_torques_and_gains_of_the_constants(compiled):
-    names = [compiled.joint(i).name for i in range(compiled.njnt)]
-    assert names == list(const.JOINT_NAMES) == [compiled.actuator(i).name for i in range(compiled.nu)]
+    assert (
+        [compiled.joint(i).name for i in range(compiled.njnt)]
+        == list(const.JOINT_NAMES)
+        == [compiled.actuator(i).name for i in range(compiled.nu)]
+    )
     torque = np.array(const.JOINT_TORQUE_NM)
     for found, expected in (
         (compiled.jnt_range, const.JOINT_RANGE_RAD),
@@ -52,19 +49,6 @@ def test_compiled_joints_have_the_order_ranges_torques_and_gains_of_the_constant
 def test_servo_saturates_at_the_deflection_of_the_relief_valve():
     stiffness, torque = np.array(const.SERVO_STIFFNESS_NM_RAD), np.array(const.JOINT_TORQUE_NM)
     np.testing.assert_allclose(torque / stiffness, const.SERVO_DEFLECTION_RAD)
-
-
-def test_compiled_pins_stand_where_the_constants_say(compiled):
-    np.testing.assert_array_equal(MACHINE_POS_W, const.MACHINE_POS_W)
-    for body, pos in (
-        ("undercarriage", const.MACHINE_POS_W),
-        ("house", [0, 0, const.SWING_HEIGHT_M]),
-        ("boom", const.BOOM_PIN_S),
-        ("arm", [const.BOOM_LENGTH_M, 0, 0]),
-        ("bucket", [const.ARM_LENGTH_M, 0, 0]),
-    ):
-        np.testing.assert_array_equal(compiled.body(body).pos, pos)
-    np.testing.assert_array_equal(compiled.site("cutting_edge").pos, [const.BUCKET_LENGTH_M, 0, 0])
 
 
 def test_working_ranges_are_those_of_the_datasheet():

@@ -66,10 +66,6 @@ def test_reference_stops_at_the_joint_limit_without_a_jolt(control, joint, direc
     assert np.abs(np.diff(trace, 2)).max() / DT**2 <= 2.0 * const.JOINT_ACCEL_RAD_S2[joint]
 
 
-def test_action_beyond_the_stick_is_clipped():
-    np.testing.assert_array_equal(checked_action([2.0, -3.0, 0.5, 0.0]), [1.0, -1.0, 0.5, 0.0])
-
-
 @pytest.mark.parametrize("action", [[0.0] * 3, [[0.0] * 4], 0.0, [0.0, np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0, 0.0]])
 def test_action_of_wrong_shape_or_not_finite_is_refused(action):
     with pytest.raises(ConfigurationError, match="action"):

@@ -1,3 +1,5 @@
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -16,8 +18,7 @@ NOTHING = Patches.none()
 
 
 def reaction_of(patches):
-    none, com_t = np.zeros(3), np.array([0.6, 0.0, 0.2])
-    return Reaction(force_w_n=none, torque_w_nm=none, payload_mass_kg=0.0, payload_com_t=com_t, patches=patches)
+    return dataclasses.replace(Reaction.free(0.0, np.array([0.6, 0.0, 0.2])), patches=patches)
 
 
 def edge_reaction(machine, force_w_n, friction=0.0):
@@ -75,31 +76,16 @@ def works_of_substeps(machine, ctrl_at, ticks, renew):
     return np.array(works)
 
 
-def test_small_resistance_is_overcome_and_large_resistance_stalls(machine):
-    free, hindered, stalled = (pull_in(machine, force)[50] for force in (0.0, 2e4, 1e6))
-    assert free < -1.0
-    assert hindered < -1.0
-    assert -1e-4 < stalled < 0.0
-
-
-@pytest.mark.parametrize("force_n", [1e4, 5e4, 1e5, 1e6, 1e8])
-def test_resistance_of_any_size_never_reverses_the_edge_nor_chatters_in_a_stall(machine, force_n):
+@pytest.mark.parametrize("force_n", [0.0, 1e4, 2e4, 5e4, 1e5, 1e6, 1e8])
+def test_small_resistance_is_overcome_large_stalls_and_none_reverses_the_edge_or_chatters(machine, force_n):
     speeds = pull_in(machine, force_n)
     assert speeds.max() <= 1e-6
+    if force_n <= 2e4:
+        assert speeds[50] < -1.0
+    if force_n >= 1e6:
+        assert -1e-4 < speeds[50] < 0.0
     if force_n in (5e4, 1e6, 1e8):
         assert np.abs(np.diff(speeds[40:])).max() <= 1e-3
-
-
-def test_resistance_takes_energy_in_every_substep(machine):
-    machine.reset(REACHED_OUT)
-    works = works_of_substeps(
-        machine,
-        lambda i: REACHED_OUT + 0.3 * np.sin(i / 30.0) * np.array([1.0, 0.5, -1.0, 1.0]),
-        50,
-        lambda: edge_reaction(machine, [4e4, 5e3, 2e4], friction=0.5),
-    )
-    assert works.max() <= 1e-6
-    assert works.sum() < -100.0
 
 
 @given(st.integers(0, 2**32 - 1))

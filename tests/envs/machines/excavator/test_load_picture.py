@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator import load_picture
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.load_picture import LOAD_SKIN, LoadPicture, load_grid
@@ -21,14 +20,6 @@ def layer(z_t):
     x, y = np.meshgrid(np.arange(0.35, 1.0, 0.08), np.arange(-0.32, 0.33, 0.08))
     places = np.stack([x, y, np.full_like(x, z_t)], axis=-1).reshape(-1, 3)
     return places, np.full(len(places), RADIUS_M)
-
-
-def test_the_grid_covers_the_opening():
-    geometry = bucket_geometry()
-    grid = load_grid()
-    assert grid[..., 0].min() == geometry.profile_t[-1, 0]
-    assert grid[..., 0].max() == geometry.profile_t[0, 0]
-    assert np.ptp(grid[..., 1]) == pytest.approx(geometry.inner_width_m)
 
 
 @pytest.mark.parametrize("z_t", [0.2, 0.0, -0.15])
@@ -73,9 +64,3 @@ def test_the_skin_faces_out_of_the_opening(model):
     sheet = model.skin_face[first : first + 2 * np.prod(np.subtract(load_grid().shape[:2], 1))]
     a, b, c = (vertices[sheet[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] < 0.0).all()
-
-
-def test_smoothing_keeps_a_plane():
-    x, y = np.indices((6, 5)).astype(float)
-    plane = 0.2 * x - 0.1 * y
-    np.testing.assert_allclose(load_picture._smooth(plane)[1:-1, 1:-1], plane[1:-1, 1:-1], atol=1e-12)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture, _resampled
@@ -99,9 +98,3 @@ def test_soil_that_leaves_the_bucket_leaves_the_skin(machine, picture, soil_with
     picture.update(soil_with_parcels())
     assert not drawn(machine, "load")
     assert not drawn(machine, "grains_0")
-
-
-def test_all_soil_has_the_colour_of_the_scene(machine):
-    machine.set_appearance(Appearance(soil_rgb=(0.4, 0.3, 0.2)))
-    colours = machine.model.mat_rgba[machine.model.skin_matid, :3]
-    np.testing.assert_allclose(colours, [[0.4, 0.3, 0.2]] * len(colours), atol=1e-6)

@@ -1,16 +1,7 @@
-import mujoco
 import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.excavator import surfaces
-
-
-def test_terrain_grid_spans_the_dig_area():
-    grid = surfaces.terrain_grid()
-    assert grid.shape == (61, 61, 2)
-    np.testing.assert_allclose(grid[0, 0], [-3.0, -3.0])
-    np.testing.assert_allclose(grid[-1, -1], [3.0, 3.0])
-    np.testing.assert_allclose(grid[1, 0] - grid[0, 0], [0.1, 0.0])
 
 
 def test_vertices_are_the_surface_and_a_skirt_below_its_border():
@@ -42,8 +33,3 @@ def test_skin_is_a_closed_sheet_that_faces_outwards(model, name):
     _, uses = np.unique(edges, axis=0, return_counts=True)
     assert uses.max() == 2
     assert (uses == 1).sum() == (vertices[:, 2] < 0).sum()  # only the foot of the skirt is open
-
-
-def test_skins_are_pictures_only(model):
-    assert model.nhfield == 0
-    assert (model.geom_type != mujoco.mjtGeom.mjGEOM_HFIELD).all()

@@ -35,11 +35,13 @@ def test_fingers_keep_their_speed_limit(run):
     assert 0.5 * const.FINGER_SPEED_M_S < speed.max() <= 1.05 * const.FINGER_SPEED_M_S
 
 
-def test_fingers_press_with_their_largest_force_at_most(started, run):
+def test_fingers_touch_the_block_between_them_and_press_with_their_largest_force_at_most(started, run):
+    assert not started.fingers_touching().any()
     # A block held between the pads as they close: they stop 2 cm before their targets, which asks for twice that force.
     joint, place = started.data.joint("block2"), [*started.grasp_pos_w, 1, 0, 0, 0]
     for _ in range(30):
         joint.qpos[:], joint.qvel[:] = place, 0
         run(0.0, 1)
-    assert started.fingers_touching()[:, 2].all()
+    assert np.array_equal(started.fingers_touching(), [np.arange(4) == 2] * 2)
+    assert started.opening == pytest.approx(0.04 / 0.12, abs=0.02)
     assert started.data.actuator("gripper").force[0] == pytest.approx(-2 * const.FINGER_FORCE_N, rel=1e-9)

@@ -29,8 +29,8 @@ def real_worksite():
 @pytest.fixture
 def site(real_worksite):
     """A machine at rest over the pile, and soil and box as a test wants them."""
-    soil = SimpleNamespace(payload_mass_kg=0.0, **parcels())
-    return SimpleNamespace(machine=real_worksite.machine, tool=real_worksite.tool, soil=soil, box_mass_kg=0.0)
+    soil = SimpleNamespace(payload_mass_kg=0.0, box_mass_kg=0.0, **parcels())
+    return SimpleNamespace(machine=real_worksite.machine, soil=soil)
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def cycle(site):
     cycle = DigCycle(site, draw_scene("train", 0), target_id=0)
     site.soil.payload_mass_kg = 300.0
     cycle.update()
-    site.soil.payload_mass_kg, site.box_mass_kg = 5.0, 295.0
+    site.soil.payload_mass_kg, site.soil.box_mass_kg = 5.0, 295.0
     return cycle
 
 

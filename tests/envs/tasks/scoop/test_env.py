@@ -97,7 +97,7 @@ def test_a_soil_of_ones_own_shapes_the_pile_and_is_dug():
     assert np.array_equal(again.scene.heights_m, sand.scene.heights_m)
 
 
-def test_mask_shows_the_commanded_patch_of_the_soil(seeing_env):
+def test_mask_shows_the_commanded_patch_of_the_soil_as_the_depth_of_the_picture_does(seeing_env):
     observation, _ = seeing_env.reset(seed=2)
     points_w = seeing_env.renderer.terrain_points_w()
     mask = mask_of(observation)
@@ -106,6 +106,9 @@ def test_mask_shows_the_commanded_patch_of_the_soil(seeing_env):
     assert seeing_env.target.contains(seeing_env.camera.points_w(seeing_env.depth_m()))[mask].all()
     center_w = np.nanmean(points_w[mask], axis=0)
     assert np.hypot(*(center_w - seeing_env.target.center_w)[:2]) < 0.25
+    # Where nothing stands before the patch, the picture's own depth tells the same mask.
+    seen_w = seeing_env.camera.points_w(seeing_env.depth_m())
+    assert np.array_equal(seeing_env.target.contains(seen_w) & mask, mask)
 
 
 def test_all_targets_of_a_scene_are_seen_and_paired_resets_differ_in_the_mask_only(seeing_env):

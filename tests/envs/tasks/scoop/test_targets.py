@@ -19,17 +19,12 @@ def test_patch_contains_exactly_its_own_square(x, y, yaw, along, across):
     assert not target.contains(inside - 0.82 * left)
 
 
-def test_height_does_not_matter_for_the_patch():
-    target = Target(center_w=np.zeros(3), yaw_rad=0.3)
-    assert target.contains(np.array([[0.1, 0.1, -2.0], [0.1, 0.1, 5.0]])).all()
-
-
-def test_a_point_that_is_not_known_lies_outside_of_every_patch():
+def test_any_height_is_inside_and_a_point_that_is_not_known_outside_of_every_patch():
     points_w = np.full((4, 5, 3), np.nan)
-    points_w[1, 2] = [0.2, -0.1, 0.6]
+    points_w[1, 2:4] = [[0.2, -0.1, -2.0], [0.2, -0.1, 5.0]]
     points_w[2, 2] = [1.2, -0.1, 0.6]
     inside = Target(center_w=np.zeros(3), yaw_rad=0.0).contains(points_w)
-    assert np.argwhere(inside).tolist() == [[1, 2]]
+    assert np.argwhere(inside).tolist() == [[1, 2], [1, 3]]
 
 
 def test_flat_ground_offers_no_target():

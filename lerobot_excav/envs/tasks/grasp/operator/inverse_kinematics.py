@@ -33,46 +33,30 @@ class GripperKinematics:
         self._down = self._configuration.get_transform_frame_to_world("grasp", "site").rotation()
         self._start = self._down
         self._gripper = mink.FrameTask("grasp", "site", position_cost=_POSITION_COST, orientation_cost=_DIRECTION_COST)
-        self._posture = mink.PostureTask(self._configuration.model, cost=_POSTURE_COST)
-        self._posture.set_target(const.HOME_JOINT_POS)
+        posture = mink.PostureTask(self._configuration.model, cost=_POSTURE_COST)
+        posture.set_target(const.HOME_JOINT_POS)
+        self._tasks = [self._gripper, posture]
         self._limits = [mink.ConfigurationLimit(self._configuration.model)]
 
     def start_from(self, joint_pos: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Begin a motion at a pose of the arm.
-
-        Args:
-            joint_pos: Joint positions [rad], (6,).
-
-        Returns:
-            Position of the grasp point there [m], (3,), world frame.
-        """
+        """Begin a motion at joint positions (6,) [rad]; return where the grasp point is there, (3,) [m]."""
         self._configuration.update(joint_pos)
         pose = self._configuration.get_transform_frame_to_world("grasp", "site")
         self._start = pose.rotation()
         return np.array(pose.translation())
 
     def joint_pos_at(self, grasp_pos_w: NDArray[np.float64], *, upright: float = 1.0) -> NDArray[np.float64]:
-        """Return the joint positions [rad], (6,), that bring the grasp point to a position near the last one.
+        """Return the joint positions (6,) [rad] that bring the grasp point to a position (3,) [m] near the last one.
 
-        Out of reach, the arm comes as near as its joint limits allow.
-
-        Args:
-            grasp_pos_w: Wanted position [m], (3,), world frame.
-            upright: How far the tool has turned from its direction at the start to straight down, 0 to 1.
+        Out of reach, the arm comes as near as its joint limits allow. `upright` says how far the tool has turned from
+        its direction at the start to straight down, 0 to 1.
         """
         turn = self._start.inverse() @ self._down
         rotation = self._start @ mink.SO3.exp(upright * turn.log())
         self._gripper.set_target(mink.SE3.from_rotation_and_translation(rotation, grasp_pos_w))
         for _ in range(_ITERATIONS):
             # A time step of one second: the velocity is the whole step of a Newton iteration.
-            velocity = mink.solve_ik(
-                self._configuration,
-                [self._gripper, self._posture],
-                dt=1.0,
-                solver="daqp",
-                damping=_DAMPING,
-                limits=self._limits,
-            )
+            velocity = mink.solve_ik(self._configuration, self._tasks, 1.0, "daqp", _DAMPING, limits=self._limits)
             self._configuration.integrate_inplace(velocity, 1.0)
             if np.linalg.norm(self._gripper.compute_error(self._configuration)) < _TOLERANCE_M:
                 break

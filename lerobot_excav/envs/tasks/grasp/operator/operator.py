@@ -14,11 +14,8 @@ class GraspOperator:
     """Grasps the commanded block and puts it into the tray.
 
     It sees where the block lies and plans way-points, whose path inverse kinematics turns into joint position targets;
-    way-points and pace differ from grasp to grasp. A new command makes it plan anew, with open fingers: what they
-    hold by then falls.
-
-    Args:
-        rng: Source of way-points and pace.
+    way-points and pace, drawn from `rng`, differ from grasp to grasp. A new command makes it plan again, with open
+    fingers: what they hold by then falls.
     """
 
     def __init__(self, *, rng: np.random.Generator) -> None:
@@ -26,11 +23,7 @@ class GraspOperator:
         self._kinematics = GripperKinematics()
 
     def reset(self, env: FR5GraspEnv) -> None:
-        """Plan the grasp of the block that an environment commands now.
-
-        Args:
-            env: The environment, in any state of its episode.
-        """
+        """Plan the grasp of the block that an environment, in any state of its episode, commands now."""
         variation = draw_variation(self._rng, phase_count=len(PHASES))
         cell = env.workcell
         start_pos_w = self._kinematics.start_from(cell.joint_pos)
@@ -39,11 +32,7 @@ class GraspOperator:
         self._ticks = 0
 
     def act(self, env: FR5GraspEnv) -> NDArray[np.float32]:
-        """Return the action of the next frame: joint position targets [rad] and opening [0..1], (7,) float32.
-
-        Args:
-            env: The environment that was given to `reset`.
-        """
+        """Return the action of the next frame: joint position targets [rad] and opening [0..1], (7,) float32."""
         if env.target_id != self._target_id:
             self.reset(env)
         # Ticks of a frame are whole: the environment accepts no other frame rates.

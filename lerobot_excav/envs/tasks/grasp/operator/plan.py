@@ -58,11 +58,7 @@ class Command(NamedTuple):
 
 
 class Plan:
-    """The path of one grasp.
-
-    Args:
-        way_points: Way-points in the order of their times; the first is the start.
-    """
+    """The path of one grasp, through way-points in the order of their times; the first is the start."""
 
     def __init__(self, way_points: list[WayPoint]) -> None:
         self._way_points = way_points
@@ -73,13 +69,10 @@ class Plan:
         return self._way_points[-1].time_s
 
     def at(self, time_s: float) -> Command:
-        """Return what is asked for at a time.
+        """Return what is asked for at a time since the start [s].
 
         Between two way-points the position follows the minimum-jerk polynomial (Flash and Hogan 1985, eq. 5), after
         the last it stays. The tool turns upright on the way to the first.
-
-        Args:
-            time_s: Time since the start [s].
         """
         for start, end in zip(self._way_points, self._way_points[1:], strict=False):
             if time_s < end.time_s:
@@ -91,13 +84,7 @@ class Plan:
 
 
 def plan_grasp(start_pos_w: NDArray[np.float64], block_pos_w: NDArray[np.float64], variation: Variation) -> Plan:
-    """Plan how to fetch a block and put it into the tray.
-
-    Args:
-        start_pos_w: Where the grasp point is now [m], (3,), world frame.
-        block_pos_w: Centre of the block [m], (3,), world frame.
-        variation: Style of this grasp.
-    """
+    """Plan how to fetch a block and put it into the tray, from where the grasp point is now, both (3,) [m]."""
     block_xy, tray_xy = block_pos_w[:2], np.array(layout.TRAY_POS_W) + variation.release_offset_m
     above = [*(block_xy + variation.approach_offset_m), APPROACH_HEIGHT_M + variation.approach_raise_m]
     grip = [*(block_xy + variation.grip_offset_m), GRIP_HEIGHT_M]

@@ -35,12 +35,7 @@ class Variation:
 
 
 def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
-    """Draw a style.
-
-    Args:
-        rng: Source of randomness.
-        phase_count: Number of phases of a grasp.
-    """
+    """Draw the style of a grasp of so many phases."""
     return Variation(
         approach_offset_m=rng.normal(0.0, APPROACH_SPREAD_M, size=2),
         approach_raise_m=float(rng.normal(0.0, RAISE_SPREAD_M)),

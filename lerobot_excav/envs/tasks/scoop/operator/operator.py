@@ -28,11 +28,8 @@ class DigOperator:
     """Digs the commanded target, issuing only joystick commands.
 
     It sees the true state of the worksite, plans the path of the bucket in cylinder coordinates around the swing axis
-    and follows it with rate commands. Style and tremor differ from cycle to cycle. A new command makes it plan again:
-    at once as long as it has not loaded, else when it has dumped what it carries.
-
-    Args:
-        rng: Source of style and tremor.
+    and follows it with rate commands. Style and tremor, drawn from `rng`, differ from cycle to cycle. A new command
+    makes it plan again: at once as long as it has not loaded, else when it has dumped what it carries.
     """
 
     def __init__(self, *, rng: np.random.Generator) -> None:
@@ -58,14 +55,7 @@ class DigOperator:
         return self.phase == "rest"
 
     def act(self, env: ExcavatorEnv) -> NDArray[np.float32]:
-        """Return the joystick command for the next frame.
-
-        Args:
-            env: The environment that was given to `reset`.
-
-        Returns:
-            Swing, boom, arm, bucket in [-1, 1], shape (4,), float32.
-        """
+        """Return the joystick command for the next frame: swing, boom, arm, bucket in [-1, 1], (4,) float32."""
         if env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest"):
             self.reset(env)
         joint_pos = env.worksite.machine.joint_pos

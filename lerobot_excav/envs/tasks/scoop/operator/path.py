@@ -56,30 +56,25 @@ class BucketPose:
 
 def line(start: BucketPose, end: BucketPose, *, about_pin: bool, samples: int = 24) -> list[BucketPose]:
     """Interpolate two poses, with the bucket pin (or else the cutting edge) on a straight line in the cylinder."""
+
+    def numbers(pose: BucketPose) -> NDArray[np.float64]:
+        place = (pose.pin_radius_m, pose.pin_height_m) if about_pin else (pose.radius_m, pose.height_m)
+        return np.array([*place, pose.pitch_rad, pose.swing_rad])
+
     poses = []
     for s in np.linspace(0.0, 1.0, samples):
-        pitch = (1 - s) * start.pitch_rad + s * end.pitch_rad
-        swing = (1 - s) * start.swing_rad + s * end.swing_rad
-        if about_pin:
-            radius = (1 - s) * start.pin_radius_m + s * end.pin_radius_m
-            height = (1 - s) * start.pin_height_m + s * end.pin_height_m
-            poses.append(BucketPose.of_pin(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
-        else:
-            radius = (1 - s) * start.radius_m + s * end.radius_m
-            height = (1 - s) * start.height_m + s * end.height_m
-            poses.append(BucketPose(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
+        radius, height, pitch, swing = ((1 - s) * numbers(start) + s * numbers(end)).tolist()
+        make = BucketPose.of_pin if about_pin else BucketPose
+        poses.append(make(radius_m=radius, height_m=height, pitch_rad=pitch, swing_rad=swing))
     return poses
 
 
 def joint_pos_near(pose: BucketPose, *, keep: str = "edge") -> NDArray[np.float64]:
-    """Solve for the joints, giving way in pitch where the wanted one is out of reach.
+    """Solve for the joints (4,) [rad], giving way in pitch where the wanted one is out of reach.
 
     Args:
         pose: Wanted pose.
         keep: What stays in place when the pitch gives way: the cutting `edge` or the bucket `pin`.
-
-    Returns:
-        Joint positions [rad], shape (4,).
 
     Raises:
         UnreachableError: No pitch within 1.3 rad brings the bucket there.
@@ -101,11 +96,8 @@ class JointMotion:
     """A joint path run through within the machine's speeds and accelerations.
 
     The path is first timed so that the busiest joint runs at full speed, then its clock is started and stopped
-    with a ramp long enough for the slowest joint to accelerate.
-
-    Args:
-        path: Joint positions [rad], shape (n, 4), n >= 2.
-        speed: Fraction of the machine's speeds to use.
+    with a ramp long enough for the slowest joint to accelerate. The path is (n, 4) [rad], n >= 2; `speed` is the
+    fraction of the machine's speeds to use.
     """
 
     def __init__(self, path: Sequence[NDArray[np.float64]] | NDArray[np.float64], *, speed: float) -> None:

@@ -32,13 +32,7 @@ DUMP_REACH_M = 0.1
 def plan_cut(soil: Soil, target: Target, variation: Variation) -> list[BucketPose]:
     """Plan the cut: down into the patch, then towards the machine until the bucket has swept its fill.
 
-    Args:
-        soil: The soil as it lies.
-        target: The commanded dig region.
-        variation: Style of the cycle.
-
-    Returns:
-        Poses from above the entry, out of the soil, to the end of the cut.
+    It begins above the entry, out of the soil.
     """
     radius, swing, _ = cylinder_from_world(target.center_w)
     entry_radius = radius + variation.entry_along_m

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+TREMOR_TIME_S = 0.4  # how long the noise of a hand remembers itself (kind: guess)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
@@ -38,12 +40,7 @@ class Variation:
 
 
 def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
-    """Draw the style of one cycle.
-
-    Args:
-        rng: Source of the style.
-        phase_count: Number of phases that get a pause of their own.
-    """
+    """Draw the style of one cycle, with a pause before each of its phases."""
     return Variation(
         speed=rng.uniform(0.85, 1.0),
         entry_along_m=rng.uniform(0.0, 0.16),
@@ -64,18 +61,15 @@ def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
 class Tremor:
     """Slow noise of a hand on a joystick: an Ornstein-Uhlenbeck process per axis.
 
-    Args:
-        rng: Source of the noise.
-        size: Standard deviation as a fraction of full stick.
-        time_constant_s: How long the noise remembers itself [s] (kind: guess).
+    Its size is the standard deviation as a fraction of full stick.
     """
 
-    def __init__(self, rng: np.random.Generator, *, size: float, time_constant_s: float = 0.4) -> None:
-        self._rng, self._size, self._time_constant_s = rng, size, time_constant_s
+    def __init__(self, rng: np.random.Generator, *, size: float) -> None:
+        self._rng, self._size = rng, size
         self._value = np.zeros(4)
 
     def step(self, dt_s: float) -> NDArray[np.float64]:
         """Return the noise after a further `dt_s`, shape (4,)."""
-        keep = np.exp(-dt_s / self._time_constant_s)
+        keep = np.exp(-dt_s / TREMOR_TIME_S)
         self._value = keep * self._value + self._size * np.sqrt(1.0 - keep**2) * self._rng.standard_normal(4)
         return self._value

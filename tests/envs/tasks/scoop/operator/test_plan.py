@@ -3,12 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator.layout import (
-    MACHINE_POS_W,
-    TARGET_BOX,
-    cylinder_from_world,
-    world_from_cylinder,
-)
+from lerobot_excav.envs.machines.excavator import layout
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_from_world, world_from_cylinder
 from lerobot_excav.envs.soil import Soil
 from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, UnreachableError, joint_pos_near, line
 from lerobot_excav.envs.tasks.scoop.operator.plan import FLOOR_CLEARANCE_M, plan_carry, plan_cut, plan_dump
@@ -37,11 +33,11 @@ def test_cylinder_coordinates_round_trip():
         radius, swing, height = cylinder_from_world(point_w)
         assert np.allclose(world_from_cylinder(radius, swing), point_w[:2])
         assert height == point_w[2]
-    assert cylinder_from_world(np.array([MACHINE_POS_W[0] + 3.0, 0.0, 1.0])) == (3.0, 0.0, 1.0)
+    assert cylinder_from_world(np.array([layout.MACHINE_POS_W[0] + 3.0, 0.0, 1.0])) == (3.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("target_id", range(4))
-def test_cut_enters_inside_the_patch_and_never_touches_the_floor(scene, soil, target_id):
+def test_cut_enters_inside_the_patch_goes_towards_the_machine_rolls_in_and_leaves_the_floor(scene, soil, target_id):
     target = scene.targets[target_id]
     for variation in VARIATIONS:
         cut = plan_cut(soil, target, variation)
@@ -51,13 +47,8 @@ def test_cut_enters_inside_the_patch_and_never_touches_the_floor(scene, soil, ta
         assert below.any()
         assert target.contains(points_w[first])
         assert points_w[:, 2].min() >= FLOOR_CLEARANCE_M - 1e-9
-
-
-def test_cut_goes_towards_the_machine_and_rolls_in(scene, soil):
-    cut = plan_cut(soil, scene.targets[0], VARIATIONS[0])
-    radii, pitches = [p.radius_m for p in cut], [p.pitch_rad for p in cut]
-    assert np.all(np.diff(radii) <= 1e-9)
-    assert pitches[-1] < pitches[0]
+        assert np.all(np.diff([pose.radius_m for pose in cut]) <= 1e-9)
+        assert cut[-1].pitch_rad < cut[0].pitch_rad
 
 
 def test_deeper_style_cuts_deeper_where_there_is_soil():
