@@ -45,7 +45,7 @@ class Soil:
         extent_m: Size of the dig area along x and y; a whole number of cells.
         cell_size_m: Size of a column.
         fidelity: Numerical effort, one of `FIDELITIES`.
-        seed: Seed of the offsets of new parcels; `reset` starts it anew.
+        seed: Seed of the offsets of new parcels; `reset` starts it again.
         container: Target box outside of the dig area, or None.
         floor_depth_m: Depth of the rigid floor below z = 0.
 

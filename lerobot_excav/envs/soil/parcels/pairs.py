@@ -150,7 +150,7 @@ def _sort_rows(
 
 @kernel
 def find_pairs(positions: Array, radii: Array, asleep: Flags, old: Pairs, old_rows: Indices, new: Pairs) -> Pairs:
-    """List the neighbours anew; two parcels that both sleep are none.
+    """List the neighbours again; two parcels that both sleep are none.
 
     Args:
         positions: (n, 3) centres [m].

@@ -139,7 +139,7 @@ def test_a_stack_stays_at_rest_and_its_energy_does_not_grow():
 
 
 def test_what_contacts_remember_outlives_new_lists_of_neighbours(rng):
-    """Two sticky lumps fly past each other: the list is made anew again and again, their contacts stay closed.
+    """Two sticky lumps fly past each other: the list is made again and again, their contacts stay closed.
 
     The twin has no list: it looks at all pairs and forgets only what opens.
     """
