@@ -146,9 +146,11 @@ def _metric_differences(key: str, a: Any, b: Any) -> list[str]:
 
 
 def _differences(key: str, a: Any, b: Any) -> list[str]:
-    if a.shape != b.shape:
-        return [f"{key}: shapes {a.shape} and {b.shape}"]
+    if (a.shape, a.dtype.kind) != (b.shape, b.dtype.kind) or (a.dtype != b.dtype and a.dtype.kind != "U"):
+        return [f"{key}: {a.dtype} {a.shape} and {b.dtype} {b.shape}"]
     same = (a == b) | ((a != a) & (b != b))
+    if a.dtype.kind == "f":
+        same &= np.signbit(a) == np.signbit(b)
     if same.all():
         return []
     frame = int(np.argmin(same.reshape(len(a), -1).all(axis=1)))

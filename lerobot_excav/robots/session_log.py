@@ -88,6 +88,9 @@ class SessionLog:
         """
         if self._episode is None:
             return
+        # What was commanded after the last action was never obeyed, nor shown in a frame.
+        commands, frames = self._episode["commands"], self._episode["frames"]
+        self._episode["commands"] = [commands[0], *(change for change in commands[1:] if change[0] < frames)]
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("a", encoding="utf-8") as file:

@@ -131,12 +131,18 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
 
         Raises:
             DeviceError: The robot is connected already.
+            MaskMissingError: No mask is found for the first target; the robot stays disconnected.
         """
         if self._env is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
         self._env = self.make_env()
         self._number, self._skipped = self._first, 0
-        self.start_scene()
+        try:
+            self.start_scene()
+        except Exception:
+            self._env.close()
+            self._env = None
+            raise
         logging.getLogger().addHandler(self._phases)
         self.connected.add(self)
 

@@ -146,6 +146,7 @@ def _set_first(parsed: Arguments, words: list[str], command: str) -> None:
         raise ConfigurationError(
             f"{' '.join(words)!r} has no option before it; `lerobot-excav {command} --help` lists the options"
         )
+    require(getattr(parsed, name) in (None, []), f"{name} is given twice, before the options and as --{name}")
     if typing.get_origin(typing.get_type_hints(type(parsed))[name]) is list:
         setattr(parsed, name, words)
     elif len(words) == 1:

@@ -71,6 +71,8 @@ def run(arguments: DemosArguments) -> int:
     if summary.failures:
         kept = "kept" if settings.keep_failures else "left out"
         print(f"{len(summary.failures)} episodes without success ({kept}): {' '.join(summary.failures)}")
+    if summary.waited:
+        print(f"{len(summary.waited)} episodes left out, whose machine waited for its mask: {' '.join(summary.waited)}")
     print(
         f"{summary.simulated_s:.0f} s simulated in {summary.wall_s:.0f} s "
         f"({summary.simulated_s / max(summary.wall_s, 1e-9):.1f} x real time)"

@@ -21,7 +21,10 @@ from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import EvaluationChoice
 from lerobot_excav.scripts.demos import ResumableArguments, played
 
-MASK_SETTINGS = ("mask_source", "mask_condition", "mask_noise", "target_overlay")
+PICTURE_SETTINGS = (
+    *("mask_source", "mask_condition", "mask_noise", "target_overlay"),
+    *("observation_height", "observation_width"),
+)
 
 
 @dataclass(kw_only=True)
@@ -36,7 +39,7 @@ class OperatorArguments(ResumableArguments, PlayedScenes):
     def __post_init__(self) -> None:
         super().__post_init__()
         default = type(self.env)()
-        for name in MASK_SETTINGS:
+        for name in PICTURE_SETTINGS:
             value = getattr(self.env, name)
             require(
                 value == getattr(default, name),

@@ -263,3 +263,11 @@ def test_lerobots_environments_give_the_same_bits_as_one_alone(gym_id, trace, *,
         ({key: array[0] for key, array in observation.items()}, float(reward[0])) for observation, reward in played
     ]
     assert_same(of_seed_4, trace)
+
+
+@pytest.mark.parametrize("number", [np.int64(-5), np.int64(0), np.float32(3.5)])
+@pytest.mark.parametrize("spec", TASKS.values(), ids=lambda spec: spec.id)
+def test_numbers_of_numpy_keep_the_limits(spec, number):
+    with pytest.raises(ConfigurationError, match="episode_length="):
+        spec.make_settings(episode_length=number)
+    assert type(spec.make_settings(episode_length=np.int64(7)).episode_length) is int

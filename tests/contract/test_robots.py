@@ -2,6 +2,7 @@
 
 import logging
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -162,6 +163,18 @@ def test_a_robot_without_a_mask_is_not_driven(make_robot, still):
     for use in (lambda: robot.send_action(still), robot.start_scene):
         with pytest.raises(MaskMissingError, match="'oracle' finds nothing for target 1 of scene 0"):
             use()
+
+
+def test_a_robot_that_finds_no_mask_at_first_stays_disconnected(make_robot, monkeypatch):
+    robot = make_robot()
+    robot.disconnect()
+    with monkeypatch.context() as patched:
+        patched.setattr(robot, "_require_mask", Mock(side_effect=MaskMissingError("nothing found")))
+        with pytest.raises(MaskMissingError):
+            robot.connect()
+    assert not robot.is_connected
+    robot.connect()
+    assert robot.is_connected
 
 
 def test_depth_is_offered_on_request_only(make_robot):

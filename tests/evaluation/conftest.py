@@ -12,7 +12,7 @@ from lerobot_excav.evaluation.run import Run
 MASK = {"mask_source": "oracle", "mask_condition": "correct", "mask_noise": "none", "mask_noise_px": 0}
 SHARED = {
     **{"scene_set": "test", **MASK, "target_overlay": False, "mask_missing": False, "mask_missing_frames": 0},
-    **{"frames": 200, "is_success": True},
+    **{"frames": 200, "fps": 10, "episode_length": 200, "is_success": True},
 }
 SCOOP = {
     **{"simulation_version": 2, "task": "Scoop-v0", "soil": "sand", "fidelity": "standard", "target_success": True},

@@ -89,6 +89,8 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
         ({"mask_noise": "erode"}, "kinds of mask noise: erode and none"),
         ({"mask_noise_px": 2}, "strengths of mask noise: 0 and 2"),
         ({"target_overlay": True}, "pictures with and without overlay"),
+        ({"fps": 25}, "frame rates: 10 and 25"),
+        ({"episode_length": 100}, "time limits: 100 and 200"),
         ({"soil": "gravel"}, "soils: gravel and sand"),
         ({"fidelity": "fine"}, "fidelities: fine and standard"),
         ({"simulation_version": 1}, "versions of the simulation: 1 and 2"),

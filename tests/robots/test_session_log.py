@@ -1,5 +1,6 @@
 """Where a session is logged, and what happens where it cannot be."""
 
+import json
 from datetime import datetime
 
 import pytest
@@ -20,3 +21,12 @@ def test_a_log_that_cannot_be_written_is_an_error(tmp_path):
     log.begin(0, scene_id=0, target_id=0)
     with pytest.raises(DeviceError, match=r"robot\.session_log=.*cannot be written"):
         log.write()
+
+
+def test_a_command_after_the_last_action_is_not_logged(tmp_path):
+    log = SessionLog(tmp_path / "session.jsonl", SCOOP, SCOOP.make_settings())
+    log.begin(0, scene_id=0, target_id=0)
+    for target_id in (0, 2, 2, 1):
+        log.count_frame(target_id)
+    log.write()
+    assert json.loads(log.path.read_text())["commands"] == [[0, 0], [2, 2]]

@@ -61,6 +61,7 @@ def test_words_become_arguments(argv, expected):
         (["--dish=["], r"--dish='\[' cannot be read"),
         (["--dish=--"], "--dish='--' cannot be read"),
         (["--hot=very"], "hot.*Couldn't parse 'very' into a bool"),
+        (["a", "--table=b"], "table is given twice"),
         (["a", "b"], "one table is needed, not 2: a b"),
         (["--plates=3", "a"], "unrecognized arguments: a"),
     ],

@@ -41,6 +41,7 @@ def check_dataset(
     require_columns(spec, info.features)
     wanted = sorted(range(info.total_episodes) if episodes is None else set(episodes))
     unknown = [index for index in wanted if not 0 <= index < info.total_episodes]
+    require(bool(wanted), "--episodes=[] names no episode; leave it out to check all")
     require(not unknown, f"--episodes names {unknown}; the dataset has episodes 0 to {info.total_episodes - 1}")
     require(replays >= 0, f"--replays={replays} must not be negative")
 

@@ -105,4 +105,4 @@ def _require_playable(episode: SessionEpisode) -> None:
         f"commands={episode.commands!r} is not possible; it begins with [0, first target]",
     )
     require_integer("commands: target_id", first[1], 0, targets - 1)
-    checked_schedule(changes, targets)
+    checked_schedule(changes, targets, episode.frames)

@@ -34,6 +34,7 @@ class DemonstrationSummary:
         out: The dataset.
         episodes: Episodes in the dataset.
         failures: `pair_uid` of every episode without success.
+        waited: `pair_uid` of every episode that is left out because the machine waited for its mask.
         simulated_s: Simulated time of all episodes, kept or not [s].
         wall_s: Time that this call took [s].
     """
@@ -41,6 +42,7 @@ class DemonstrationSummary:
     out: Path
     episodes: int
     failures: list[str]
+    waited: list[str]
     simulated_s: float
     wall_s: float
 
@@ -76,7 +78,8 @@ def record_demonstrations(
     return DemonstrationSummary(
         out=out,
         episodes=sum(outcome["kept"] for outcome in outcomes),
-        failures=[outcome["pair_uid"] for outcome in outcomes if not outcome["success"]],
+        failures=[o["pair_uid"] for o in outcomes if not o["success"] and not o["mask_missing_frames"]],
+        waited=[o["pair_uid"] for o in outcomes if o["mask_missing_frames"]],
         simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.env.fps,
         wall_s=time.monotonic() - start,
     )
@@ -105,17 +108,26 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
             if outcome["kept"]:
                 append_episode(dataset, EpisodeStore(partial.episodes).read(pair), settings)
             outcomes.append(outcome)
-    if not any(outcome["kept"] for outcome in outcomes):
-        raise DatasetError(
-            f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; "
-            f"to look at them, remove {partial.folder} and record again with --keep_failures=true "
-            "(the time limit is --env.episode_length)"
-        )
+    _require_any(outcomes, partial.folder)
     dataset.finalize()
     shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
     write_provenance(partial.dataset, settings, outcomes)
     write_index(partial.dataset)
     return outcomes
+
+
+def _require_any(outcomes: list[Outcome], folder: Path) -> None:
+    if any(outcome["kept"] for outcome in outcomes):
+        return
+    if waited := sum(outcome["mask_missing_frames"] > 0 for outcome in outcomes):
+        raise DatasetError(
+            f"in {waited} of {len(outcomes)} episodes the machine waited for its mask, which no replay can repeat, and "
+            f"no other succeeded, so there is nothing to write; remove {folder} and choose another --env.mask_source"
+        )
+    raise DatasetError(
+        f"none of {len(outcomes)} episodes succeeded, so there is nothing to write; to look at them, remove {folder} "
+        "and record again with --keep_failures=true (the time limit is --env.episode_length)"
+    )
 
 
 def _start(

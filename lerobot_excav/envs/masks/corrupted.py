@@ -9,7 +9,7 @@ import numpy as np
 
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import MaskSource, MaskView, Pixels, TargetMask
-from lerobot_excav.errors import ExcavError
+from lerobot_excav.errors import ExcavError, require
 
 MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
 """`correct`; `zero`: an empty mask; `random`: the same blob elsewhere in the picture, off its place; `mismatched`: the
@@ -41,6 +41,7 @@ class CorruptedSource:
         """Return the corrupted mask of a command.
 
         Raises:
+            ConfigurationError: The source returns something else than a mask of the picture's size.
             ExcavError: No other place is free for the blob of a `random` mask.
         """
         key = (*view.scene_key, command.target_id)
@@ -55,14 +56,33 @@ class CorruptedSource:
     def _under_condition(self, view: MaskView, command: Command, rng: np.random.Generator) -> TargetMask | None:
         if self._condition == "zero":
             size = (view.camera.height, view.camera.width)
-            return TargetMask(pixels=np.zeros(size, dtype=bool), target_id=None, source="none")
+            empty = np.zeros(size, dtype=bool)
+            return TargetMask(pixels=empty, target_id=None, source="none", parameters={"condition": "zero"})
         if self._condition == "mismatched":
             others = view.other_commands()
-            return self._source.mask(view, others[int(rng.choice(len(others)))])
-        mask = self._source.mask(view, command)
+            return self._found(view, others[int(rng.choice(len(others)))])
+        mask = self._found(view, command)
         if mask is None or self._condition == "correct":
             return mask
         return replace(mask, pixels=moved_elsewhere(mask.pixels, rng), target_id=None)
+
+    def _found(self, view: MaskView, command: Command) -> TargetMask | None:
+        """Ask the source; an empty mask counts as nothing."""
+        mask = self._source.mask(view, command)
+        if mask is None:
+            return None
+        size = (view.camera.height, view.camera.width)
+        source, pixels = type(self._source).__name__, getattr(mask, "pixels", None)
+        require(
+            isinstance(mask, TargetMask) and isinstance(pixels, np.ndarray),
+            f"the mask source {source} returned a {type(mask).__name__}; return a TargetMask, or None for nothing",
+        )
+        require(
+            mask.pixels.shape == size and mask.pixels.dtype == bool,
+            f"the mask source {source} returned pixels of shape {mask.pixels.shape} and type {mask.pixels.dtype}; "
+            f"return {size} of bool, the size of the main picture",
+        )
+        return mask if mask.pixels.any() else None
 
 
 def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:

@@ -14,7 +14,7 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
-from lerobot_excav.envs.tasks.registry import task_spec
+from lerobot_excav.envs.tasks.registry import TASKS, task_spec
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.envs.tasks.task import OBS_TYPES
@@ -67,7 +67,8 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         depth_info: bool = False,
         **settings: Any,
     ) -> None:
-        self.task_spec = spec = task_spec("task", self.TASK if task is None else task)
+        env_type = TASKS[self.TASK].env_type
+        self.task_spec = spec = task_spec("task", self.TASK if task is None else task, env_type=env_type)
         self.settings = spec.make_settings(**settings)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("render_mode", render_mode, RENDER_MODES)
@@ -209,7 +210,8 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
             ConfigurationError: An option is unknown or has a value that is not possible.
         """
         super().reset(seed=seed)
-        selection = select_episode(seed, options or {}, rng=self.np_random, target_count=self.task_spec.target_count)
+        targets, length = self.task_spec.target_count, self.episode_length
+        selection = select_episode(seed, options or {}, rng=self.np_random, target_count=targets, length=length)
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
@@ -230,9 +232,10 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
             reward, terminated = self._advance(action)
             self._frame += 1
             self._main_img = None
-            self._change_command()
-            held_reward, held_terminated = self._wait_for_mask()
-            reward, terminated = reward + held_reward, terminated or held_terminated
+            if not terminated and self._frame + self._missing_frames < self.episode_length:
+                self._change_command()
+                held_reward, terminated = self._wait_for_mask()
+                reward += held_reward
         frames = self._frame + self._missing_frames
         truncated = (self.mask_missing or frames >= self.episode_length) and not terminated
         info = self._info(is_over=terminated or truncated)

@@ -48,6 +48,8 @@ class EpisodeRecord(BaseModel):
 
     simulation_version: int
     task: str
+    fps: int
+    episode_length: int
     scene_set: str
     scene_id: int
     target_id: int  # commanded first
@@ -180,7 +182,8 @@ class TaskMeasures:
         """All that the episodes of a run share, with the plural for messages."""
         version = {"simulation_version": "versions of the simulation"}
         overlay = {"target_overlay": "pictures with and without overlay"}
-        return {**MASK_SETTINGS, **overlay, **self.settings, **self.shared, **version}
+        time = {"fps": "frame rates", "episode_length": "time limits"}
+        return {**MASK_SETTINGS, **overlay, **time, **self.settings, **self.shared, **version}
 
     def column(self, key: str) -> Column:
         """Return a column by its key."""

@@ -30,19 +30,19 @@ class Selection:
 
 
 def select_episode(
-    seed: int | None, options: Mapping[str, Any], *, rng: np.random.Generator, target_count: int
+    seed: int | None, options: Mapping[str, Any], *, rng: np.random.Generator, target_count: int, length: int
 ) -> Selection:
     """Choose scene, target and changes of the command.
 
     Without options the scene is the seed, or drawn if there is none, and its remainder the target. Options may hold
     `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of actions carried out before
-    and the target), and LeRobot's own keys, which begin with `lerobot_`.
+    and the target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
 
     Raises:
         ConfigurationError: A value is not a whole number or out of range, or an option is unknown.
     """
     for key in options:
-        if not key.startswith("lerobot_"):
+        if not str(key).startswith("lerobot_"):
             require_choice("options", key, RESET_OPTIONS)
     number = int(rng.integers(2**31)) if seed is None else seed
     scene_id = options.get("scene_id", number)
@@ -50,21 +50,26 @@ def select_episode(
     target_id = options.get("target_id", scene_id % target_count)
     require_integer("target_id", target_id, 0, target_count - 1)
     commands = options.get("commands")
-    schedule = None if commands is None else checked_schedule(commands, target_count)
+    schedule = None if commands is None else checked_schedule(commands, target_count, length)
     return Selection(scene_id=int(scene_id), target_id=int(target_id), schedule=schedule)
 
 
-def checked_schedule(commands: Sequence[Sequence[int]], target_count: int) -> Schedule:
-    """Return changes of the command as whole numbers.
+def checked_schedule(commands: Sequence[Sequence[int]], target_count: int, length: int) -> Schedule:
+    """Return changes of the command in an episode of `length` frames as whole numbers.
 
     Raises:
-        ConfigurationError: A frame is below 1 or not after the one before, or a target does not exist.
+        ConfigurationError: A frame is below 1, not after the one before or so late that no action follows, or a target
+            does not exist.
     """
     last = 0
-    for change in commands:
-        require(len(change) == 2, f"commands={commands!r}: {change!r} is not a pair of frame and target")
+    pairs = commands.tolist() if isinstance(commands, np.ndarray) else commands
+    require(isinstance(pairs, list | tuple), f"commands={commands!r} is not a list of pairs of frame and target")
+    for change in pairs:
+        is_pair = isinstance(change, list | tuple) and len(change) == 2
+        require(is_pair, f"commands={commands!r}: {change!r} is not a pair of frame and target")
         frame, target_id = change
-        require_integer("commands: frame", frame, last + 1, hint="Frames are numbered from the start and rise.")
+        hint = "Frames are numbered from the start and rise; an action has to follow."
+        require_integer("commands: frame", frame, last + 1, length - 1, hint=hint)
         require_integer("commands: target_id", target_id, 0, target_count - 1)
         last = frame
-    return tuple((int(frame), int(target_id)) for frame, target_id in commands)
+    return tuple((int(frame), int(target_id)) for frame, target_id in pairs)

@@ -9,7 +9,7 @@ import math
 import typing
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -101,8 +101,9 @@ def check_settings(settings: Any, prefix: str = "") -> None:
     for name, allowed in declared_settings(type(settings)).items():
         value = getattr(settings, name)
         _check(f"{prefix}{name}", value, types[name], allowed)
-        if isinstance(value, Integral) and not isinstance(value, int):
-            setattr(settings, name, int(value))  # NumPy's own numbers do not go into JSON
+        if isinstance(value, Real) and not isinstance(value, int | float):
+            # NumPy's own numbers do not go into JSON.
+            setattr(settings, name, int(value) if isinstance(value, Integral) else float(value))
 
 
 def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
@@ -111,7 +112,8 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
         return
     if not any(_is_of(value, each) for each in kinds) or not _is_allowed(value, allowed):
         names = [_KIND_NAMES.get(each, each.__name__) for each in kinds if each is not NoneType]
-        is_beyond = isinstance(value, int | float) and allowed.high is not None and value > allowed.high
+        is_number = isinstance(value, Real)
+        is_beyond = is_number and allowed.high is not None and value > allowed.high
         limits = f"from {allowed.low} to {allowed.high}" if is_beyond else allowed.words
         wanted = limits if allowed.values is not None else f"{' or '.join(names)} {limits}"
         raise ConfigurationError(f"{name}={value!r} is not possible; give {wanted.strip()}. {allowed.hint}".rstrip())
@@ -124,7 +126,7 @@ def _is_of(value: Any, kind: Any) -> bool:
     if kind is int:
         return isinstance(value, Integral)
     if kind is float:
-        return isinstance(value, int) or (isinstance(value, float) and math.isfinite(value))
+        return isinstance(value, Integral) or (isinstance(value, Real) and math.isfinite(value))
     if kind is Path:
         return isinstance(value, str | Path)
     return isinstance(value, kind) if isinstance(kind, type) else True
@@ -133,6 +135,7 @@ def _is_of(value: Any, kind: Any) -> bool:
 def _is_allowed(value: Any, allowed: Allowed) -> bool:
     if allowed.values is not None:
         return value in allowed.values
-    if not isinstance(value, int | float):
+    is_number = isinstance(value, Real)
+    if not is_number:
         return True
     return (allowed.low is None or value >= allowed.low) and (allowed.high is None or value <= allowed.high)

@@ -15,3 +15,4 @@ class FR5SimConfig(FR5Settings, SimulatedRobotConfig):
     """Set up the simulated FR5 arm from LeRobot's command line; see both classes."""
 
     PREFIX: ClassVar[str] = "robot."
+    IS_ENDLESS: ClassVar[bool] = True

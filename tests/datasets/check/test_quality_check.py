@@ -48,6 +48,8 @@ def test_the_episodes_asked_for_are_checked_and_the_index_says_so(paired_dataset
     assert build_index(tmp_path / "d")["qc"].value_counts().to_dict() == {"unchecked": 17, "passed": 2}
     with pytest.raises(ConfigurationError, match=r"--episodes names \[19\]"):
         check_dataset(tmp_path / "d", episodes=[19])
+    with pytest.raises(ConfigurationError, match="names no episode"):
+        check_dataset(tmp_path / "d", episodes=[])
     assert check_dataset(tmp_path / "d", replays=19)["replayed"].all()
     assert build_index(tmp_path / "d")["qc"].tolist() == ["passed"] * 19
 

@@ -141,7 +141,7 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
         ({"commands": [[0, 9]]}, "commands: target_id=9 .*from 0 to 3"),
         ({"commands": [[1, 2]]}, r"commands=\[\[1, 2\]\] .*it begins with \[0, first target\]"),
         ({"commands": [[0, 1], [3, 7]]}, "commands: target_id=7 .*from 0 to 3"),
-        ({"commands": [[0, 1], [3, 2], [3, 0]]}, "commands: frame=3 .*from 4 on"),
+        ({"commands": [[0, 1], [3, 2], [3, 0]]}, "commands: frame=3 .*from 4 to 7"),
         ({"commands": [[0, 1], [2]]}, r"commands=.*: \[2\] is not a pair of frame and target"),
         ({"commands": []}, "commands=.* at least 1 item"),
         ({"simulation_version": "1"}, "simulation_version='1': .*valid integer"),

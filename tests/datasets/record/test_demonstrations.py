@@ -78,16 +78,28 @@ def test_failed_episodes_are_listed_and_kept_on_request_only(tmp_path, keep):
     assert build_index(tmp_path / "d")["success"].tolist() == [True, *[False] * keep, True, True]
 
 
-def test_an_episode_whose_mask_is_missing_is_never_kept(tmp_path, monkeypatch):
+def hide(monkeypatch, *targets):
     true_mask = toy_reach.env.ReachEnv.true_mask
     monkeypatch.setattr(
-        toy_reach.env.ReachEnv, "true_mask", lambda env, command: true_mask(env, command) & (command.target_id != 2)
+        toy_reach.env.ReachEnv,
+        "true_mask",
+        lambda env, command: true_mask(env, command) & (command.target_id not in targets),
     )
+
+
+def test_an_episode_whose_mask_is_missing_is_never_kept(tmp_path, monkeypatch):
+    hide(monkeypatch, 2)
     summary = record_toy(tmp_path / "d", scenes=1, keep_failures=True)
-    assert (summary.episodes, summary.failures) == (3, ["toy_reach/train/0/2"])
+    assert (summary.episodes, summary.failures, summary.waited) == (3, [], ["toy_reach/train/0/2"])
     outcome = read_provenance(tmp_path / "d").outcomes[2]
     assert outcome["mask_missing_frames"] > 0
     assert not outcome["kept"]
+
+
+def test_a_source_that_finds_nothing_is_named_where_nothing_is_written(tmp_path, monkeypatch):
+    hide(monkeypatch, 0, 1, 2, 3)
+    with pytest.raises(DatasetError, match=r"in 4 of 4 episodes the machine waited .* another --env\.mask_source"):
+        record_toy(tmp_path / "d", scenes=1, keep_failures=True)
 
 
 def test_nothing_is_written_when_every_episode_fails(tmp_path):

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource, moved_elsewhere, noisy_pixels
 from lerobot_excav.envs.masks.oracle import OracleSource
-from lerobot_excav.errors import ExcavError
+from lerobot_excav.envs.masks.source import TargetMask
+from lerobot_excav.errors import ConfigurationError, ExcavError
 
 HEIGHT, WIDTH = 40, 60
 
@@ -142,3 +143,34 @@ def test_a_blob_far_from_the_edge_is_shifted_by_the_size(size_px, seed):
     moved = np.argwhere(noisy("shift", size_px, seed=seed)).mean(axis=0)
     start = np.argwhere(BLOB).mean(axis=0)
     assert abs(np.linalg.norm(moved - start) - size_px) <= np.sqrt(0.5) + 1e-9
+
+
+class Returns:
+    """A source that returns what it was given."""
+
+    def __init__(self, mask):
+        self.mask = lambda view, command: mask
+
+
+def corrupted(pixels, **settings):
+    mask = TargetMask(pixels=pixels, target_id=0, source="mine") if isinstance(pixels, np.ndarray) else pixels
+    given = {"condition": "correct", "noise": "none", "noise_px": 0, **settings}
+    return CorruptedSource(Returns(mask), **given).mask(View(), command(0))
+
+
+@pytest.mark.parametrize("settings", [{}, {"noise": "shift", "noise_px": 3}, {"condition": "random"}])
+def test_an_empty_mask_counts_as_nothing(settings):
+    assert corrupted(np.zeros((HEIGHT, WIDTH), bool), **settings) is None
+
+
+@pytest.mark.parametrize(
+    ("returned", "named"),
+    [
+        (np.ones((5, 5), bool), r"Returns returned pixels of shape \(5, 5\) .*\(40, 60\) of bool"),
+        (np.full((HEIGHT, WIDTH), 255, np.uint8), "type uint8"),
+        ("a mask", "Returns returned a str; return a TargetMask, or None"),
+    ],
+)
+def test_what_is_not_a_mask_of_the_pictures_size_is_refused(returned, named):
+    with pytest.raises(ConfigurationError, match=named):
+        corrupted(returned)

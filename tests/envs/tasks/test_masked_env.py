@@ -152,3 +152,18 @@ def test_step_and_command_before_reset_say_so():
     for use in (lambda env: env.step(STILL), lambda env: env.command):
         with pytest.raises(ConfigurationError, match="reset"):
             use(ReachEnv())
+
+
+def test_no_command_follows_the_action_that_ends_an_episode(monkeypatch):
+    env = ReachEnv(obs_type="agent_pos")
+    env.reset(options={"scene_id": 2, "target_id": 0, "commands": [(2, 1)]})
+    env.step(STILL)
+    monkeypatch.setattr(env, "_advance", lambda action: (1.0, True))
+    *_, terminated, _, info = env.step(STILL)
+    assert (terminated, info["target_id"]) == (True, 0)
+    assert info["episode_metrics"]["commands"] == [[0, 0]]
+
+
+def test_an_environment_takes_its_own_tasks_only():
+    with pytest.raises(ConfigurationError, match=r"task='Scoop-v0' .*Reach-v0"):
+        ReachEnv(task="Scoop-v0")

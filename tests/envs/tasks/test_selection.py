@@ -7,7 +7,7 @@ from lerobot_excav.errors import ConfigurationError
 
 def select(seed=None, rng_seed=0, targets=4, **options):
     rng = np.random.default_rng(rng_seed)
-    chosen = select_episode(seed, options, rng=rng, target_count=targets)
+    chosen = select_episode(seed, options, rng=rng, target_count=targets, length=400)
     return chosen.scene_id, chosen.target_id, chosen.schedule
 
 
@@ -47,8 +47,12 @@ def test_numpy_integers_become_pythons_own():
         ({"target_id": True}, "target_id=True"),
         ({"target_id": 4}, "target_id=4 .*from 0 to 3"),
         ({"scene": 3}, "options='scene' .*'scene_id', 'target_id', 'commands'"),
-        ({"commands": [(0, 1)]}, "commands: frame=0 .*from 1 on"),
-        ({"commands": [(4, 1), (4, 2)]}, "commands: frame=4 .*from 5 on"),
+        ({"commands": [(0, 1)]}, "commands: frame=0 .*from 1 to 399"),
+        ({"commands": [(4, 1), (4, 2)]}, "commands: frame=4 .*from 5 to 399"),
+        ({"commands": [(400, 1)]}, "commands: frame=400 .*from 1 to 399"),
+        ({"commands": [5]}, "5 is not a pair"),
+        ({"commands": {3: 1}}, "is not a list of pairs"),
+        ({"commands": iter([(3, 1)])}, "is not a list of pairs"),
         ({"commands": [(4, 7)]}, "commands: target_id=7 .*from 0 to 3"),
         ({"commands": [(4, 1, 2)]}, "is not a pair"),
     ],

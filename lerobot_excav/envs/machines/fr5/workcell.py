@@ -115,6 +115,11 @@ class Workcell:
             raise ExcavError(f"the simulation diverged at {self.data.time:.3f} s; report this scene and action")
 
     @property
+    def reference(self) -> NDArray[np.float64]:
+        """What the servos follow now, in the form of an action (7,); as a target it keeps arm and grip as they are."""
+        return self._reference.copy()
+
+    @property
     def joint_pos(self) -> NDArray[np.float64]:
         """Joint positions [rad], (6,)."""
         return np.array(self.data.qpos[self._qpos[:6]])

@@ -89,8 +89,9 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
             self.workcell.tick(action)
         return self.grasp.update(), False
 
-    def _holding_action(self) -> NDArray[np.float32]:
-        return self.agent_pos
+    def _holding_action(self) -> NDArray[np.float64]:
+        # Not `agent_pos`: fingers told to stay where a block stops them would no longer press on it.
+        return self.workcell.reference
 
     def _region(self, target_id: int) -> int:
         return target_id  # a block is what its index says

@@ -16,6 +16,8 @@ class FR5Settings(TaskSettings):
     """What a user may set about the arm; see `TaskSettings`."""
 
     ENV_TYPE: ClassVar[str] = "fr5_grasp"
+    IS_ENDLESS: ClassVar[bool] = False
+    """Whether somebody else ends the episodes, so that no frame is too late for a change of the command."""
 
     task: str = with_default(TaskSettings, "task", "FR5Grasp-v0")
     fps: int = with_default(TaskSettings, "fps", 50)
@@ -28,7 +30,7 @@ class FR5Settings(TaskSettings):
         super().__post_init__()
         length = self.episode_length or round(EPISODE_DURATION_S * self.fps)
         require(
-            self.retarget_frame is None or self.retarget_frame < length,
+            self.retarget_frame is None or self.IS_ENDLESS or self.retarget_frame < length,
             f"{self.PREFIX}retarget_frame={self.retarget_frame} is not possible; give a whole number from 1 to "
             f"{length - 1}. An episode has {length} frames; leave it out to command one block only.",
         )

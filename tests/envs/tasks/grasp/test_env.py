@@ -3,6 +3,7 @@ import pytest
 
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.grasp.operator import GraspOperator
+from lerobot_excav.errors import ConfigurationError
 
 
 def blind(**settings):
@@ -136,3 +137,33 @@ def test_the_operator_succeeds_with_the_second_target():
     _, _, metrics = operate(env)
     assert metrics["is_success"]
     assert metrics["first_grasped_block"] == metrics["commands"][-1][1] != metrics["target_id"]
+
+
+def test_a_held_arm_keeps_the_block_it_has_lifted():
+    env = blind(episode_length=2000)
+    env.reset(seed=5)
+    operator = GraspOperator(rng=np.random.default_rng(1))
+    operator.reset(env)
+    lifted = env.workcell.block_pos_w[env.target_id, 2] + 0.06
+    while env.workcell.block_pos_w[env.target_id, 2] < lifted:
+        env.step(operator.act(env))
+    heights_m = []
+    for _ in range(150):
+        env._advance(env._holding_action())
+        heights_m.append(env.workcell.block_pos_w[env.target_id, 2])
+    assert min(heights_m) > lifted - 0.005
+    assert np.ptp(heights_m[25:]) < 0.001  # the joints catch up with what they were told, then nothing moves
+
+
+def test_a_success_is_not_undone_by_a_command_after_the_last_action():
+    env = blind()
+    env.reset(seed=1)
+    actions = []
+    operator = GraspOperator(rng=np.random.default_rng(1))
+    operator.reset(env)
+    for _ in range(env.episode_length):
+        actions.append(operator.act(env))
+        *_, info = env.step(actions[-1])
+    assert info["is_success"]
+    with pytest.raises(ConfigurationError, match=r"frame=400 .*from 1 to 399"):
+        env.reset(seed=1, options={"commands": [(400, 2)]})
