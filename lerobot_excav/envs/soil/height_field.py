@@ -12,19 +12,12 @@ from lerobot_excav.errors import require
 
 
 class Grid(NamedTuple):
-    """Where the columns of a height field stand in its plane.
+    """Where the columns of a height field stand in its plane."""
 
-    Attributes:
-        x0: Centre of the first cell along x [m].
-        y0: The same along y [m].
-        dx: Cell size along x [m].
-        dy: The same along y [m].
-    """
-
-    x0: float
-    y0: float
-    dx: float
-    dy: float
+    x0: float  # centre of the first cell along x [m]
+    y0: float  # the same along y [m]
+    dx: float  # cell size along x [m]
+    dy: float  # the same along y [m]
 
     @classmethod
     def centred(cls, shape: tuple[int, int], dx: float, dy: float) -> "Grid":

@@ -8,21 +8,13 @@ from lerobot_excav.errors import require
 
 
 class Origin(NamedTuple):
-    """Where a number comes from, and what it may be.
+    """Where a number comes from, and what it may be."""
 
-    Attributes:
-        unit: Its unit.
-        low: Least allowed value.
-        high: Greatest allowed value.
-        kind: `paper`, `datasheet`, `derived`, `tuned` or `guess`.
-        source: Document or reasoning.
-    """
-
-    unit: str
-    low: float
-    high: float
-    kind: str
-    source: str
+    unit: str  # its unit
+    low: float  # least allowed value
+    high: float  # greatest allowed value
+    kind: str  # `paper`, `datasheet`, `derived`, `tuned` or `guess`
+    source: str  # document or reasoning
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,21 +37,13 @@ class PatchKind(IntEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patches:
-    """Resistance that the soil can offer to a tool.
+    """Resistance that the soil can offer to a tool."""
 
-    Attributes:
-        points_w: (k, 3) points of the tool [m].
-        normals_w: (k, 3) unit directions in which the soil pushes the tool.
-        limits_n: (k,) greatest push [N], above zero.
-        frictions: (k,) friction coefficient across the normal.
-        kinds: (k,) `PatchKind`.
-    """
-
-    points_w: Array
-    normals_w: Array
-    limits_n: Array
-    frictions: Array
-    kinds: NDArray[np.int8]
+    points_w: Array  # (k, 3) points of the tool [m]
+    normals_w: Array  # (k, 3) unit directions in which the soil pushes the tool
+    limits_n: Array  # (k,) greatest push [N], above zero
+    frictions: Array  # (k,) friction coefficient across the normal
+    kinds: NDArray[np.int8]  # (k,) `PatchKind`
 
     @classmethod
     def none(cls) -> "Patches":

@@ -30,29 +30,17 @@ _WEDGE_REACH_M = 4.0
 
 
 class SoilStrength(NamedTuple):
-    """What the force model knows of a soil.
+    """What the force model knows of a soil."""
 
-    Attributes:
-        unit_weight: Weight of a volume [N/m3].
-        friction: Friction angle [rad].
-        steel_friction: Angle of friction between soil and steel [rad].
-        cohesion: Cohesion [Pa].
-        bearing_cohesion: Bearing factor of the cohesion [1].
-        bearing_depth: Bearing factor of the depth [1].
-        bearing_width: Bearing factor of the width [1].
-        penetration_scale: Factor on the bearing of the cutting edge [1].
-        table: Rake, failure angle, cohesion and surcharge factor, see `earthmoving.failure_table`.
-    """
-
-    unit_weight: float
-    friction: float
-    steel_friction: float
-    cohesion: float
-    bearing_cohesion: float
-    bearing_depth: float
-    bearing_width: float
-    penetration_scale: float
-    table: Array
+    unit_weight: float  # weight of a volume [N/m3]
+    friction: float  # friction angle [rad]
+    steel_friction: float  # angle of friction between soil and steel [rad]
+    cohesion: float  # cohesion [Pa]
+    bearing_cohesion: float  # bearing factor of the cohesion [1]
+    bearing_depth: float  # bearing factor of the depth [1]
+    bearing_width: float  # bearing factor of the width [1]
+    penetration_scale: float  # factor on the bearing of the cutting edge [1]
+    table: Array  # rake, failure angle, cohesion and surcharge factor, see `earthmoving.failure_table`
 
 
 @kernel

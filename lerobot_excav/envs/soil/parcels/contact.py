@@ -43,19 +43,12 @@ _TANGENTIAL_IMPEDANCE = math.sqrt(TANGENTIAL_STIFFNESS)
 
 
 class Law(NamedTuple):
-    """Coefficients of one kind of contact.
+    """Coefficients of one kind of contact."""
 
-    Attributes:
-        stiffness: Of the normal spring [N/m].
-        sliding: Coefficient of sliding friction.
-        rolling: Coefficient of rolling friction, at the radius of the parcel.
-        cohesion: Pull of a closed contact per cross-section of the smaller partner [Pa].
-    """
-
-    stiffness: float
-    sliding: float
-    rolling: float
-    cohesion: float
+    stiffness: float  # of the normal spring [N/m]
+    sliding: float  # coefficient of sliding friction
+    rolling: float  # coefficient of rolling friction, at the radius of the parcel
+    cohesion: float  # pull of a closed contact per cross-section of the smaller partner [Pa]
 
 
 @kernel

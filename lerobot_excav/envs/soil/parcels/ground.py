@@ -19,23 +19,14 @@ LIFT = 0.05
 
 
 class Site(NamedTuple):
-    """What parcels can land on; z counts from the rigid floor.
+    """What parcels can land on; z counts from the rigid floor."""
 
-    Attributes:
-        heights: (nx, ny) of the dig area [m].
-        grid: Its first cell centre and cell sizes.
-        box_heights: (mx, my) of the soil in the target box above its floor [m].
-        box_grid: Its grid, in the plane of the box.
-        box: The box.
-        level_z: Height of the ground around the dig area [m].
-    """
-
-    heights: Array
-    grid: Grid
-    box_heights: Array
-    box_grid: Grid
-    box: BoxWalls
-    level_z: float
+    heights: Array  # (nx, ny) of the dig area [m]
+    grid: Grid  # its first cell centre and cell sizes
+    box_heights: Array  # (mx, my) of the soil in the target box above its floor [m]
+    box_grid: Grid  # its grid, in the plane of the box
+    box: BoxWalls  # the box
+    level_z: float  # height of the ground around the dig area [m]
 
 
 @kernel

@@ -19,29 +19,17 @@ _PAIRS_PER_PARCEL = 16
 
 
 class Pairs(NamedTuple):
-    """Neighbours i < j in rows of i. The arrays have room to spare; only the first `start[n]` pairs count.
+    """Neighbours i < j in rows of i. The arrays have room to spare; only the first `start[n]` pairs count."""
 
-    Attributes:
-        start: (capacity + 1,) where the row of each parcel begins.
-        partner: (room,) j of each pair.
-        closed: (room,) 1 if the pair touched when last looked at.
-        springs: (room, 6) memory of each contact [m].
-        anchors: (capacity, 3) positions at which the list was made [m].
-        first: (room,) work space: i of the pairs in the order found.
-        second: (room,) work space: j of the same.
-        last: (cells,) work space: the last parcel of each cell.
-        before: (capacity,) work space: the parcel before each one in its cell.
-    """
-
-    start: Indices
-    partner: Indices
-    closed: Flags
-    springs: Array
-    anchors: Array
-    first: Indices
-    second: Indices
-    last: Indices
-    before: Indices
+    start: Indices  # (capacity + 1,) where the row of each parcel begins
+    partner: Indices  # (room,) j of each pair
+    closed: Flags  # (room,) 1 if the pair touched when last looked at
+    springs: Array  # (room, 6) memory of each contact [m]
+    anchors: Array  # (capacity, 3) positions at which the list was made [m]
+    first: Indices  # (room,) work space: i of the pairs in the order found
+    second: Indices  # (room,) work space: j of the same
+    last: Indices  # (cells,) work space: the last parcel of each cell
+    before: Indices  # (capacity,) work space: the parcel before each one in its cell
 
 
 def room_for(capacity: int) -> Pairs:

@@ -38,17 +38,11 @@ _FIRST_CAPACITY = 1024
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Landed:
-    """Parcels that have become ground.
+    """Parcels that have become ground."""
 
-    Attributes:
-        points_w: (n, 2) where they lay [m].
-        masses_kg: (n,) their masses.
-        place: (n,) what they lay on, one of `store.TOUCHES_…`.
-    """
-
-    points_w: Array
-    masses_kg: Array
-    place: Flags
+    points_w: Array  # (n, 2) where they lay [m]
+    masses_kg: Array  # (n,) their masses
+    place: Flags  # (n,) what they lay on, one of `store.TOUCHES_…`
 
     @property
     def is_on_ground(self) -> Bools:
