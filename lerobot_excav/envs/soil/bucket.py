@@ -160,8 +160,7 @@ class Bucket:
     def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
         """Let the underside of the bucket hold avalanches back."""
         window = field.window(pose.place(geometry.corners_t))
-        set_ceiling(
-            field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, *pose, window.union(self._window)
-        )
+        area = window.union(self._window)
+        set_ceiling(field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, pose, area)
         field.wake()
         self._window = window

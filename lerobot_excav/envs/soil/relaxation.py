@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lerobot_excav.envs.soil.arrays import Array, Flags
+from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.errors import ExcavError, require
 
@@ -38,14 +38,7 @@ def mark_around(active: Flags, i: int, j: int) -> None:
 
 @kernel
 def _column_outflow(
-    heights: Array,
-    delta: Array,
-    ceiling: Array,
-    i: int,
-    j: int,
-    rise: tuple[float, float, float],
-    rest: tuple[float, float, float],
-    border_height: float,
+    heights: Array, delta: Array, ceiling: Array, i: int, j: int, rise: Vector, rest: Vector, border_height: float
 ) -> float:
     """Book what one column gives to its neighbours; return what runs over the border."""
     nx, ny = heights.shape
@@ -73,13 +66,7 @@ def _column_outflow(
 
 @kernel
 def sweep(
-    heights: Array,
-    delta: Array,
-    active: Flags,
-    ceiling: Array,
-    cell_m: tuple[float, float],
-    slope_tan: float,
-    border_height: float,
+    heights: Array, delta: Array, active: Flags, ceiling: Array, cell_m: Level, slope_tan: float, border_height: float
 ) -> tuple[float, int]:
     """Let the active columns flow once.
 

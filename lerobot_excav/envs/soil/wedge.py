@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
@@ -44,9 +44,7 @@ class SoilStrength(NamedTuple):
 
 
 @kernel
-def wedge_area(
-    heights: Array, grid: Grid, edge: tuple[float, float, float], ahead: tuple[float, float], failure: float
-) -> float:
+def wedge_area(heights: Array, grid: Grid, edge: Vector, ahead: Level, failure: float) -> float:
     """Return the area [m2] between failure plane and surface ahead of the edge, to where they first meet.
 
     The surface within one cell of the edge is read one cell ahead: nearer, the bucket has taken it already.
@@ -84,14 +82,7 @@ def table_row(table: Array, rake: float) -> tuple[float, float, float]:
 
 @kernel
 def wedge_force(
-    weighed: Array,
-    grid: Grid,
-    edge: tuple[float, float, float],
-    depth: float,
-    rake: float,
-    ahead: tuple[float, float],
-    width: float,
-    soil: SoilStrength,
+    weighed: Array, grid: Grid, edge: Vector, depth: float, rake: float, ahead: Level, width: float, soil: SoilStrength
 ) -> float:
     """Return the force [N] at which the soil before one slice of the edge fails; formula in `earthmoving`.
 
@@ -124,7 +115,7 @@ def edge_limits(
     grid: Grid,
     edges: Array,
     rake: float,
-    ahead: tuple[float, float],
+    ahead: Level,
     width: float,
     soil: SoilStrength,
 ) -> tuple[Array, Array]:

@@ -10,10 +10,8 @@ makes in one sub-step, before it can fade.
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
-
-Vector = tuple[float, float, float]
 
 SPRINGS = 6
 """Memory of one contact: three components of the sliding spring and three of the rolling spring [m]."""

@@ -11,7 +11,7 @@ from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
-from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket
+from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket, turned
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State
 
 LARGEST_SPEED_M_S = 12.0
@@ -36,12 +36,7 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
     w = (tool.angular[0], tool.angular[1], tool.angular[2])
     for i in range(len(state.masses)):
         if state.asleep[i]:
-            q = (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2])
-            arm = (
-                rotation[0, 0] * q[0] + rotation[0, 1] * q[1] + rotation[0, 2] * q[2],
-                rotation[1, 0] * q[0] + rotation[1, 1] * q[1] + rotation[1, 2] * q[2],
-                rotation[2, 0] * q[0] + rotation[2, 1] * q[1] + rotation[2, 2] * q[2],
-            )
+            arm = turned(rotation, (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2]))
             turning = cross(w, arm)
             for a in range(3):
                 state.positions[i, a] = position[a] + arm[a]

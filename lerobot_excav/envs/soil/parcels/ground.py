@@ -3,10 +3,10 @@
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
-from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.contact import Law, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls, to_box
 from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 
@@ -30,7 +30,7 @@ class Site(NamedTuple):
 
 
 @kernel
-def _surface(heights: Array, grid: Grid, x: float, y: float) -> tuple[float, float, float]:
+def _surface(heights: Array, grid: Grid, x: float, y: float) -> Vector:
     """Return height and slopes of the bilinear surface through the cell centres; level beyond the outer ones."""
     nx, ny = heights.shape
     u = min(max((x - grid.x0) / grid.dx, 0.0), nx - 1.0)

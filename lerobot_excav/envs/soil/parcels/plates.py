@@ -3,10 +3,10 @@
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
-from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, dot, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, cross, dot, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 
 CLOSEST = 0.25
