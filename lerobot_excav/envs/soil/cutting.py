@@ -84,8 +84,7 @@ def push_aside(
 ) -> float:
     """Put a volume on the first column along a level direction that has room for it beside or below the bucket.
 
-    Returns:
-        The volume if that column lies beyond the border, else 0.
+    Returns the volume if that column lies beyond the border, else 0.
     """
     x, y = start
     while True:
@@ -186,22 +185,10 @@ def cut(
     room: float,
     intake: Bins,
 ) -> tuple[float, float]:
-    """Move the bucket through the soil by one sub-step.
+    """Move the bucket through the soil by one sub-step; heights [m], avalanche marks and `intake` change in place.
 
-    Args:
-        heights: (nx, ny) heights [m], changed in place.
-        active: (nx, ny) avalanche marks, set where heights change.
-        grid: First cell centre and cell sizes.
-        planes: (m, 4) half-spaces of the bucket in its frame.
-        pose_before: The bucket at the start.
-        pose_now: The bucket at the end.
-        window: Columns that hold the bucket at the end.
-        samples: Vertical samples per column.
-        room: Volume that the bucket can still take [m3].
-        intake: Bins before the opening, which take what enters.
-
-    Returns:
-        Volumes [m3] that entered the bucket and that were pushed over the border.
+    The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
+    can still take a volume `room` [m3]. Returns the volumes [m3] that entered and that were pushed over the border.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):

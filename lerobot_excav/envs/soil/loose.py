@@ -53,15 +53,7 @@ def _box_walls(container: Container | None, floor_depth_m: float) -> BoxWalls:
 
 
 class LooseSoil:
-    """Parcels of one soil and their surroundings.
-
-    Args:
-        parameters: The soil.
-        fidelity: Numerical effort.
-        field: The dig area.
-        box_field: The soil in the target box.
-        container: The target box, if there is one.
-        floor_depth_m: Depth of the rigid floor below z = 0.
+    """Parcels of one soil and their surroundings: dig area, soil in the target box, the box if there is one.
 
     Attributes:
         population: All parcels; z counts from the rigid floor.
@@ -101,17 +93,9 @@ class LooseSoil:
     def step(
         self, geometry: ToolGeometry | None, before: Pose | None, now: Pose | None, dt_s: float, *, cutting: bool
     ) -> float:
-        """Move the parcels along with the bucket and let those at rest become ground.
+        """Move the parcels along with the bucket, if there is one, and let those at rest become ground.
 
-        Args:
-            geometry: The bucket, or None if there is none.
-            before: Where it was, or None if it was not there.
-            now: Where it is, or None.
-            dt_s: Duration.
-            cutting: Whether soil entered it in this step.
-
-        Returns:
-            Mass [kg] that landed out of bounds.
+        Cutting: soil entered it in this step. Returns the mass [kg] that landed out of bounds.
         """
         if geometry is None or now is None:
             tool = self._without_tool(dt_s)

@@ -95,8 +95,7 @@ class Soil:
     def reset(self, heights_m: ArrayLike | None = None) -> None:
         """Put new soil in the dig area and remove it everywhere else: box, bucket, air, out of bounds.
 
-        Args:
-            heights_m: (nx, ny) heights above the rigid floor, kept byte for byte; None for an empty floor.
+        Heights (nx, ny) count from the rigid floor and are kept byte for byte; None makes an empty floor.
 
         Raises:
             ConfigurationError: The shape is wrong, or a height is negative or not finite.
@@ -111,13 +110,9 @@ class Soil:
         self._rng = np.random.default_rng(self._seed)
 
     def add_parcels(self, positions_w: ArrayLike, velocities_w: ArrayLike) -> None:
-        """Add loose soil; each parcel brings `parcel_mass_kg` into the ledger.
+        """Add loose soil at (n, 3) centres [m]; each parcel brings `parcel_mass_kg` into the ledger.
 
         Beyond the fidelity's bound on awake parcels, a new one joins its nearest one.
-
-        Args:
-            positions_w: (n, 3) centres [m].
-            velocities_w: (n, 3) [m/s].
 
         Raises:
             ConfigurationError: The shapes are not the same (n, 3), or a value is not finite.
@@ -313,11 +308,8 @@ class Soil:
     def height_at(self, xy_w: ArrayLike) -> Array:
         """Return the world z of the ground [m], bilinear between cell centres; z = 0 outside of the extent.
 
-        Args:
-            xy_w: (..., 2) points [m].
-
         Raises:
-            ConfigurationError: The last axis is not 2.
+            ConfigurationError: The last axis of the points (..., 2) is not 2.
         """
         points = np.asarray(xy_w, dtype=np.float64)
         require(points.shape[-1:] == (2,), f"xy_w has shape {points.shape}; allowed: (..., 2).")

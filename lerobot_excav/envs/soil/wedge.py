@@ -121,15 +121,9 @@ def edge_limits(
 ) -> tuple[Array, Array]:
     """Return the forces [N] at which soil fails before each slice of the edge, and at which it yields to the slice.
 
-    Args:
-        heights: (nx, ny) heights [m].
-        weighed: (nx, ny) heights with everything that lies on the ground and must be lifted with the wedge [m].
-        grid: First cell centre and cell sizes.
-        edges: (n, 3) middles of the slices; z above the rigid floor.
-        rake: Angle of the plate from the horizontal [rad].
-        ahead: Level unit direction in which soil lies before the edge.
-        width: Width of the whole edge [m].
-        soil: What the soil can bear.
+    Heights are (nx, ny) [m], the weighed ones with everything that lies on the ground and must be lifted with the
+    wedge; `edges` are the (n, 3) middles of the slices, z above the rigid floor. The rake of the plate counts from the
+    horizontal [rad]; `ahead` is the level unit direction in which soil lies before the edge of this width [m].
     """
     count = len(edges)
     wedges, bearings = np.zeros(count), np.zeros(count)

@@ -58,10 +58,6 @@ class Intake:
 
     Bins of about one parcel tile the opening. A parcel is born before the fullest bin as soon as all bins together
     hold one, so that never more than one parcel's volume waits, and new parcels keep apart like the soil they were.
-
-    Args:
-        geometry: The bucket.
-        radius_m: Of a parcel.
     """
 
     def __init__(self, geometry: ToolGeometry, radius_m: float) -> None:

@@ -140,13 +140,8 @@ def _sort_rows(
 def find_pairs(positions: Array, radii: Array, asleep: Flags, old: Pairs, old_rows: Indices, new: Pairs) -> Pairs:
     """List the neighbours again; two parcels that both sleep are none.
 
-    Args:
-        positions: (n, 3) centres [m].
-        radii: (n,) [m].
-        asleep: (n,) flags.
-        old: The list before, whose memory is kept.
-        old_rows: (n,) row of each parcel in that list, -1 for a new one. Must grow with the row.
-        new: Where the list is written; another one is returned if that is too small.
+    The memory of the list `old` is kept, in which each parcel had a row `old_rows` (n,), growing, or -1 for a new one.
+    The list is written to `new`; another one is returned if that is too small.
     """
     n = len(positions)
     count = _find_near(positions, radii, asleep, new.first, new.second, new.last, new.before)

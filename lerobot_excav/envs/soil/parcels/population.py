@@ -56,17 +56,10 @@ class Landed:
 
 
 class Population:
-    """All parcels.
+    """All parcels, each in one row of `state`, where z counts from the rigid floor.
 
-    Args:
-        plates: Number of plates that they may touch, those of the bucket and of the box together.
-        laws: Coefficients of their contacts.
-        radius_m: Of a whole parcel.
-        mass_kg: Of a whole parcel.
-        most_awake: Bound on the awake ones; above it, a new parcel joins its nearest one instead.
-
-    Attributes:
-        state: One row per parcel; z counts from the rigid floor.
+    They may touch so many plates, those of the bucket and of the box together. Radius and mass are those of a whole
+    parcel. Above the bound on the awake ones, a new parcel joins its nearest one instead.
     """
 
     def __init__(self, plates: int, laws: Laws, radius_m: float, mass_kg: float, most_awake: int) -> None:
