@@ -129,18 +129,9 @@ class Bucket:
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
         for start, end in path:
-            more, over = cut(
-                field.heights,
-                field.active,
-                field.grid,
-                geometry.planes_t,
-                start,
-                end,
-                field.window(end.place(geometry.corners_t)),
-                self._fidelity.vertical_bins,
-                max(0.0, room - entered),
-                intake.bins,
-            )
+            motion = geometry.planes_t, start, end, field.window(end.place(geometry.corners_t))
+            intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
+            more, over = cut(field.heights, field.active, field.grid, *motion, *intaking)
             entered += more
             lost += over
         return entered, lost

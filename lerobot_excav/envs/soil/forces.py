@@ -135,16 +135,10 @@ class SoilResistance:
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
         edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
-        wedges, bearings = edge_limits(
-            heights_m,
-            weighed_heights_m,
-            grid,
-            edges + np.array([0.0, 0.0, floor_depth_m]),
-            math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1])),
-            ahead,
-            geometry.inner_width_m,
-            self._soil,
-        )
+        raised = edges + np.array([0.0, 0.0, floor_depth_m])
+        rake = math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1]))
+        width = geometry.inner_width_m
+        wedges, bearings = edge_limits(heights_m, weighed_heights_m, grid, raised, rake, ahead, width, self._soil)
         steel, shape = self._soil.steel_friction, edges.shape
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
         pushes = wedges * math.cos(steel)

@@ -76,13 +76,8 @@ class LooseSoil:
         self._box = _box_walls(container, floor_depth_m)
         self._level_z = floor_depth_m
         self._density_kg_m3 = parameters.density_kg_m3
-        self.population = Population(
-            WALLS + 3,
-            _laws(parameters, fidelity, self.whole_kg),
-            fidelity.parcel_radius_m,
-            self.whole_kg,
-            fidelity.most_awake,
-        )
+        laws = _laws(parameters, fidelity, self.whole_kg)
+        self.population = Population(WALLS + 3, laws, fidelity.parcel_radius_m, self.whole_kg, fidelity.most_awake)
         self.clear()
 
     def clear(self) -> None:
@@ -127,16 +122,9 @@ class LooseSoil:
         farthest = _FARTHEST * self._fidelity.parcel_radius_m
         steps = max(self._steps(dt_s), math.ceil(moved / farthest))
         positions, rotations, turn = path(before, now, steps)
-        return ToolPath(
-            1,
-            geometry.profile_t,
-            geometry.planes_t,
-            0.5 * float(geometry.inner_width_m),
-            positions,
-            rotations,
-            (now.position - before.position) / dt_s,
-            turn / dt_s,
-        )
+        shape = geometry.profile_t, geometry.planes_t, 0.5 * float(geometry.inner_width_m)
+        velocities = (now.position - before.position) / dt_s, turn / dt_s
+        return ToolPath(1, *shape, positions, rotations, *velocities)
 
     def _without_tool(self, dt_s: float) -> ToolPath:
         """Return the path of no bucket; a load stays asleep in the one that went away."""

@@ -88,15 +88,8 @@ class Patches:
         Every push and every friction force is full from a share `FULL_SHARE` of the speed on, and in between
         proportional to it, so the wrench is continuous in the motion. Its power is never positive.
         """
-        return patch_wrench(
-            self.points_w,
-            self.normals_w,
-            self.limits_n,
-            self.frictions,
-            np.array(origin_w),
-            np.array(linear_velocity_w),
-            np.array(angular_velocity_w),
-        )
+        motion = np.array(origin_w), np.array(linear_velocity_w), np.array(angular_velocity_w)
+        return patch_wrench(self.points_w, self.normals_w, self.limits_n, self.frictions, *motion)
 
 
 @kernel

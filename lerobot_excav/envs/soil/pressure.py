@@ -111,13 +111,7 @@ class PlatePressure:
         velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
         sunk = self._sinkages + dt_s * np.einsum("ij,ij->i", velocities, normals)
         self._sinkages = np.where(overlaps > 0.0, np.maximum(0.0, sunk), 0.0)
-        limits = plate_limits(
-            overlaps,
-            self._sinkages,
-            ground_factors(heights_m, grid, raised),
-            normals,
-            faces.areas_m2,
-            faces.breadths_m,
-            self._soil,
-        )
+        factors = ground_factors(heights_m, grid, raised)
+        sizes = faces.areas_m2, faces.breadths_m
+        limits = plate_limits(overlaps, self._sinkages, factors, normals, *sizes, self._soil)
         return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

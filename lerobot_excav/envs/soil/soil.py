@@ -74,16 +74,13 @@ class Soil:
             container is None or not container.overlaps(extent_m),
             "container overlaps the dig area; move its center_w outside of extent_m.",
         )
-        shape = (
-            _whole_cells(extent_m[0], cell_size_m, "extent_m[0]"),
-            _whole_cells(extent_m[1], cell_size_m, "extent_m[1]"),
-        )
+        nx, ny = (_whole_cells(extent_m[axis], cell_size_m, f"extent_m[{axis}]") for axis in range(2))
         self.parameters: SoilParameters = preset
         self.fidelity = FIDELITIES[fidelity]
         self.container = container
         self.floor_depth_m = float(floor_depth_m)
         self._seed = seed
-        self._field = HeightField(shape, (cell_size_m, cell_size_m), self.floor_depth_m)
+        self._field = HeightField((nx, ny), (cell_size_m, cell_size_m), self.floor_depth_m)
         self._box_field = _box_field(container, cell_size_m)
         self._bucket = Bucket(self.parameters, self.fidelity)
         self._loose = LooseSoil(
@@ -165,17 +162,8 @@ class Soil:
         com_t = self._payload_com_t(tool)
         if tool is None:
             return Reaction.free(self.payload_mass_kg, com_t)
-        heights = self._field.heights
-        return self._resistance.react(
-            heights,
-            self._loose.weighed_heights(),
-            self._field.grid,
-            tool,
-            self.floor_depth_m,
-            dt_s,
-            self.payload_mass_kg,
-            com_t,
-        )
+        ground = self._field.heights, self._loose.weighed_heights(), self._field.grid
+        return self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
 
     def _give_birth(self, *, is_last: bool) -> None:
         """Turn the soil that has entered the bucket into parcels at rest, where it was."""

@@ -35,7 +35,7 @@ class SoilStrength(NamedTuple):
     unit_weight: float  # weight of a volume [N/m3]
     friction: float  # friction angle [rad]
     steel_friction: float  # angle of friction between soil and steel [rad]
-    cohesion: float  # cohesion [Pa]
+    cohesion: float  # [Pa]
     bearing_cohesion: float  # bearing factor of the cohesion [1]
     bearing_depth: float  # bearing factor of the depth [1]
     bearing_width: float  # bearing factor of the width [1]

@@ -54,11 +54,6 @@ def test_each_slice_has_the_soil_before_it():
     assert bearings[1] > bearings[0] > 0.0
 
 
-def test_slices_add_up_to_the_whole_edge():
-    parts = limits(flat(), [[0.0, y, 0.7] for y in (-0.3, -0.1, 0.1, 0.3)])
-    np.testing.assert_allclose(np.sum(parts, axis=1), np.sum(limits(flat(), EDGE), axis=1))
-
-
 def test_loose_soil_on_the_ground_weighs_on_the_wedge_but_does_not_bury_the_edge():
     field = flat()
     weighed = field.heights + 0.1

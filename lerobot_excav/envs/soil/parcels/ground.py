@@ -25,7 +25,7 @@ class Site(NamedTuple):
     grid: Grid  # its first cell centre and cell sizes
     box_heights: Array  # (mx, my) of the soil in the target box above its floor [m]
     box_grid: Grid  # its grid, in the plane of the box
-    box: BoxWalls  # the box
+    box: BoxWalls
     level_z: float  # height of the ground around the dig area [m]
 
 

@@ -53,13 +53,10 @@ def enlarged(pairs: Pairs, capacity: int) -> Pairs:
     new = room_for(capacity)
     while len(new.partner) < len(pairs.partner):
         new = _more_room(new)
-    for source, target in (
-        (pairs.start, new.start),
-        (pairs.partner, new.partner),
-        (pairs.closed, new.closed),
-        (pairs.springs, new.springs),
-    ):
-        target[: len(source)] = source
+    new.start[: len(pairs.start)] = pairs.start
+    new.partner[: len(pairs.partner)] = pairs.partner
+    new.closed[: len(pairs.closed)] = pairs.closed
+    new.springs[: len(pairs.springs)] = pairs.springs
     return new
 
 
