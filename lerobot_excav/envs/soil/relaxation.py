@@ -111,10 +111,8 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
     """
     heights = np.array(heights_m, dtype=np.float64)
     require(heights.ndim == 2, f"heights_m has shape {heights.shape}; allowed: (nx, ny).")
-    require(
-        bool(np.isfinite(heights).all() and (heights >= 0).all()),
-        "heights_m has values that are not finite or below 0.",
-    )
+    sound = bool(np.isfinite(heights).all() and (heights >= 0).all())
+    require(sound, "heights_m has values that are not finite or below 0.")
     require(
         cell_size_m > 0 and slope_tan > 0, f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0."
     )

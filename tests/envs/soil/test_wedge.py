@@ -38,9 +38,8 @@ def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
 
 def test_rakes_beyond_the_table_count_as_its_ends():
     for inside, outside in ((20.0, -30.0), (90.0, 100.0), (90.0, 170.0)):
-        assert table_row(SAND.table, math.radians(outside)) == pytest.approx(
-            table_row(SAND.table, math.radians(inside))
-        )
+        found, expected = (table_row(SAND.table, math.radians(rake)) for rake in (outside, inside))
+        assert found == pytest.approx(expected)
     for inside, outside in ((90.0, 120.0), (20.0, 5.0)):
         found = limits(flat(), EDGE, rake_deg=outside)[0]
         assert found == pytest.approx(limits(flat(), EDGE, rake_deg=inside)[0])
