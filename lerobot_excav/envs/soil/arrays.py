@@ -1,4 +1,4 @@
-"""Types of the arrays that the soil is made of."""
+"""Types of the arrays and vectors that the soil is made of."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,3 +7,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.int64]
+
+Vector = tuple[float, float, float]
+Level = tuple[float, float]
+"""A point or a vector in the plane of a height field."""

@@ -80,17 +80,10 @@ class Bucket:
     def move(self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float) -> tuple[float, float]:
         """Sweep the bucket from its last pose to this one.
 
-        It takes in soil up to its heaped volume and pushes the rest ahead. A tool that was not there in the last step
-        cuts nothing.
+        It takes in soil up to its heaped volume, `load_m3` of it being there already (as in the ground), and pushes the
+        rest ahead; the field changes in place. A tool that was not there in the last step cuts nothing.
 
-        Args:
-            tool: The bucket now.
-            field: The dig area, changed in place.
-            floor_depth_m: Depth of the rigid floor below z = 0.
-            load_m3: Volume in the ground of the parcels that it carries.
-
-        Returns:
-            Volumes [m3] that entered and that were pushed over the border.
+        Returns the volumes [m3] that entered and that were pushed over the border.
 
         Raises:
             ConfigurationError: The tool jumped by more than `LARGEST_MOTION_M`.
@@ -114,14 +107,9 @@ class Bucket:
         return volumes_m3
 
     def births(self, *, all_of_it: bool, rng: Generator) -> tuple[Array, Array]:
-        """Turn what waits into parcels, without pose.
+        """Turn what waits into parcels; all of it: the rest that is less than a parcel too.
 
-        Args:
-            all_of_it: Whether the rest that is less than a parcel goes too.
-            rng: Draws their offsets.
-
-        Returns:
-            (n, 3) positions in the tool frame [m] and (n,) masses [kg].
+        Returns (n, 3) positions in the tool frame [m] and (n,) masses [kg].
         """
         if self.intake is None or self.intake.waiting_m3 <= 0.0:
             return np.zeros((0, 3)), np.zeros(0)
@@ -141,18 +129,9 @@ class Bucket:
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
         for start, end in path:
-            more, over = cut(
-                field.heights,
-                field.active,
-                field.grid,
-                geometry.planes_t,
-                start,
-                end,
-                field.window(end.place(geometry.corners_t)),
-                self._fidelity.vertical_bins,
-                max(0.0, room - entered),
-                intake.bins,
-            )
+            motion = geometry.planes_t, start, end, field.window(end.place(geometry.corners_t))
+            intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
+            more, over = cut(field.heights, field.active, field.grid, *motion, *intaking)
             entered += more
             lost += over
         return entered, lost
@@ -160,8 +139,7 @@ class Bucket:
     def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
         """Let the underside of the bucket hold avalanches back."""
         window = field.window(pose.place(geometry.corners_t))
-        set_ceiling(
-            field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, *pose, window.union(self._window)
-        )
+        area = window.union(self._window)
+        set_ceiling(field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, pose, area)
         field.wake()
         self._window = window

@@ -7,7 +7,7 @@ motion of a sample relative to the tool tells through which face it came: openin
 
 import math
 
-from lerobot_excav.envs.soil.arrays import Array, Flags
+from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
 from lerobot_excav.envs.soil.motion import Pose
@@ -24,7 +24,7 @@ _LEVEL = 0.3
 
 
 @kernel
-def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> Vector:
     """Turn a world point into the tool frame."""
     a, b, c = x - position[0], y - position[1], z - position[2]
     return (
@@ -56,7 +56,7 @@ def column_interval(planes: Array, position: Array, rotation: Array, x: float, y
 
 
 @kernel
-def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[float, float, float]) -> int:
+def crossed_face(planes: Array, before: Vector, now: Vector) -> int:
     """Return the face through which a point came inside, or `ALREADY_INSIDE`; points are in the tool frame."""
     face, latest = ALREADY_INSIDE, -1.0
     for k in range(len(planes)):
@@ -71,29 +71,20 @@ def crossed_face(planes: Array, before: tuple[float, float, float], now: tuple[f
 
 
 @kernel
-def is_covered(surface: float, grid: Grid, planes: Array, position: Array, rotation: Array, i: int, j: int) -> bool:
+def is_covered(surface: float, grid: Grid, planes: Array, pose: Pose, i: int, j: int) -> bool:
     """Tell whether a surface height of a column lies inside the bucket or above it."""
     x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
-    low, high, _ = column_interval(planes, position, rotation, x, y)
+    low, high, _ = column_interval(planes, pose.position, pose.rotation, x, y)
     return low < high and surface > low
 
 
 @kernel
 def push_aside(
-    heights: Array,
-    active: Flags,
-    grid: Grid,
-    planes: Array,
-    position: Array,
-    rotation: Array,
-    start: tuple[float, float],
-    direction: tuple[float, float],
-    volume: float,
+    heights: Array, active: Flags, grid: Grid, planes: Array, pose: Pose, start: Level, direction: Level, volume: float
 ) -> float:
     """Put a volume on the first column along a level direction that has room for it beside or below the bucket.
 
-    Returns:
-        The volume if that column lies beyond the border, else 0.
+    Returns the volume if that column lies beyond the border, else 0.
     """
     x, y = start
     while True:
@@ -102,7 +93,7 @@ def push_aside(
         i = int((x - grid.x0) / grid.dx + 0.5)
         j = int((y - grid.y0) / grid.dy + 0.5)
         raised = heights[i, j] + volume / (grid.dx * grid.dy)
-        if not is_covered(raised, grid, planes, position, rotation, i, j):
+        if not is_covered(raised, grid, planes, pose, i, j):
             heights[i, j] = raised
             mark_around(active, i, j)
             return 0.0
@@ -111,7 +102,7 @@ def push_aside(
 
 
 @kernel
-def _level_unit(rotation: Array, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+def _level_unit(rotation: Array, vector: Vector) -> tuple[float, float, float]:
     """Turn a tool vector into the world; return its level part as a unit vector and the length of that part."""
     a = rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2]
     b = rotation[1, 0] * vector[0] + rotation[1, 1] * vector[1] + rotation[1, 2] * vector[2]
@@ -122,9 +113,7 @@ def _level_unit(rotation: Array, vector: tuple[float, float, float]) -> tuple[fl
 
 
 @kernel
-def push_direction(
-    planes: Array, rotation: Array, face: int, before: tuple[float, float, float], now: tuple[float, float, float]
-) -> tuple[float, float]:
+def push_direction(planes: Array, rotation: Array, face: int, before: Vector, now: Vector) -> Level:
     """Return the level unit direction in which soil is pushed aside.
 
     A plate pushes along its outward normal. Soil that finds no room behind the opening is pushed along the
@@ -179,9 +168,7 @@ def cut_column(
             entered += taken
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
-            lost += push_aside(
-                heights, active, grid, planes, pose_now.position, pose_now.rotation, (x, y), direction, share - taken
-            )
+            lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, share - taken)
     return entered, lost
 
 
@@ -198,22 +185,10 @@ def cut(
     room: float,
     intake: Bins,
 ) -> tuple[float, float]:
-    """Move the bucket through the soil by one sub-step.
+    """Move the bucket through the soil by one sub-step; heights [m], avalanche marks and `intake` change in place.
 
-    Args:
-        heights: (nx, ny) heights [m], changed in place.
-        active: (nx, ny) avalanche marks, set where heights change.
-        grid: First cell centre and cell sizes.
-        planes: (m, 4) half-spaces of the bucket in its frame.
-        pose_before: The bucket at the start.
-        pose_now: The bucket at the end.
-        window: Columns that hold the bucket at the end.
-        samples: Vertical samples per column.
-        room: Volume that the bucket can still take [m3].
-        intake: Bins before the opening, which take what enters.
-
-    Returns:
-        Volumes [m3] that entered the bucket and that were pushed over the border.
+    The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
+    can still take a volume `room` [m3]. Returns the volumes [m3] that entered and that were pushed over the border.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):
@@ -229,14 +204,7 @@ def cut(
 
 @kernel
 def set_ceiling(
-    heights: Array,
-    active: Flags,
-    ceiling: Array,
-    grid: Grid,
-    planes: Array,
-    position: Array,
-    rotation: Array,
-    window: Window,
+    heights: Array, active: Flags, ceiling: Array, grid: Grid, planes: Array, pose: Pose, window: Window
 ) -> None:
     """Set the ceiling of the columns of a window to the underside of the bucket, or to infinity beside it.
 
@@ -245,7 +213,7 @@ def set_ceiling(
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
             x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
-            low, high, _ = column_interval(planes, position, rotation, x, y)
+            low, high, _ = column_interval(planes, pose.position, pose.rotation, x, y)
             new = low if low < high else math.inf
             if new != ceiling[i, j] and (new < heights[i, j] + grid.dx or ceiling[i, j] < heights[i, j] + grid.dx):
                 mark_around(active, i, j)

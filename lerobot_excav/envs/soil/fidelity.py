@@ -5,25 +5,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Fidelity:
-    """Numerical effort of one soil step.
+    """Numerical effort of one soil step."""
 
-    Attributes:
-        vertical_bins: Samples along the height of a column inside the bucket.
-        substep_cells: Largest motion of the tool per sub-step, in cells.
-        sweeps_per_tick: Avalanche sweeps per `TICK_S`; more let slopes come to rest sooner.
-        force_slices: Lateral slices of the cutting edge in the force model.
-        parcel_radius_m: Radius of one parcel.
-        substeps_per_tick: Sub-steps of the parcels' motion per `TICK_S`.
-        most_awake: Bound on the number of parcels that move by themselves.
-    """
-
-    vertical_bins: int
-    substep_cells: float
-    sweeps_per_tick: int
-    force_slices: int
-    parcel_radius_m: float
-    substeps_per_tick: int
-    most_awake: int
+    vertical_bins: int  # samples along the height of a column inside the bucket
+    substep_cells: float  # largest motion of the tool per sub-step, in cells
+    sweeps_per_tick: int  # avalanche sweeps per `TICK_S`; more let slopes come to rest sooner
+    force_slices: int  # lateral slices of the cutting edge in the force model
+    parcel_radius_m: float  # radius of one parcel
+    substeps_per_tick: int  # sub-steps of the parcels' motion per `TICK_S`
+    most_awake: int  # bound on the number of parcels that move by themselves
 
 
 FIDELITIES = {

@@ -47,16 +47,8 @@ def soil_strength(parameters: SoilParameters) -> SoilStrength:
 def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, width_m: float) -> Array:
     """Return the force on a flat blade that is pushed through level soil, by the kernels that the bucket uses.
 
-    The blade is thin: its edge has no bearing. No heap lies before it.
-
-    Args:
-        parameters: The soil.
-        depth_m: Depth of the edge below the surface [m].
-        rake_rad: Angle of the blade from the horizontal [rad].
-        width_m: Width of the blade [m].
-
-    Returns:
-        Backward and downward part [N], shape (2,).
+    The blade is thin: its edge has no bearing. No heap lies before it. The depth is that of the edge below the surface,
+    the rake counts from the horizontal. Returns the backward and the downward part [N], shape (2,).
     """
     p = parameters
     spacing = depth_m / 100.0
@@ -102,17 +94,9 @@ class SoilResistance:
     ) -> Reaction:
         """Return what the soil does to the tool where it is now.
 
-        To be called in every step: how far the plates have sunk in follows from one call to the next.
-
-        Args:
-            heights_m: (nx, ny) heights of the ground above the rigid floor.
-            weighed_heights_m: (nx, ny) the same with loose soil that lies on it, which the wedge must lift too.
-            grid: First cell centre and cell sizes.
-            tool: The bucket.
-            floor_depth_m: Depth of the rigid floor below z = 0.
-            dt_s: Time since the last call [s].
-            payload_mass_kg: Soil in the bucket, as the reaction shall say.
-            payload_com_t: (3,) its centre of mass, likewise.
+        To be called in every step: how far the plates have sunk in follows from one call to the next, `dt_s` ago.
+        Heights (nx, ny) count from the rigid floor, which lies `floor_depth_m` below z = 0; the weighed ones include
+        loose soil on the ground, which the wedge must lift too. The payload is what the reaction shall say.
         """
         corners_w = tool.position_w + tool.geometry.corners_t @ tool.rotation_w.T
         if corners_w[:, 2].min() + floor_depth_m > weighed_heights_m.max() + CLEAR_M:
@@ -151,16 +135,10 @@ class SoilResistance:
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
         edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
-        wedges, bearings = edge_limits(
-            heights_m,
-            weighed_heights_m,
-            grid,
-            edges + np.array([0.0, 0.0, floor_depth_m]),
-            math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1])),
-            ahead,
-            geometry.inner_width_m,
-            self._soil,
-        )
+        raised = edges + np.array([0.0, 0.0, floor_depth_m])
+        rake = math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1]))
+        width = geometry.inner_width_m
+        wedges, bearings = edge_limits(heights_m, weighed_heights_m, grid, raised, rake, ahead, width, self._soil)
         steel, shape = self._soil.steel_friction, edges.shape
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
         pushes = wedges * math.cos(steel)

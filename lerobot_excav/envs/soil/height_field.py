@@ -12,19 +12,12 @@ from lerobot_excav.errors import require
 
 
 class Grid(NamedTuple):
-    """Where the columns of a height field stand in its plane.
+    """Where the columns of a height field stand in its plane."""
 
-    Attributes:
-        x0: Centre of the first cell along x [m].
-        y0: The same along y [m].
-        dx: Cell size along x [m].
-        dy: The same along y [m].
-    """
-
-    x0: float
-    y0: float
-    dx: float
-    dy: float
+    x0: float  # centre of the first cell along x [m]
+    y0: float  # the same along y [m]
+    dx: float  # cell size along x [m]
+    dy: float  # the same along y [m]
 
     @classmethod
     def centred(cls, shape: tuple[int, int], dx: float, dy: float) -> "Grid":
@@ -160,12 +153,9 @@ class HeightField:
         shape = self.heights.shape
         new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
         require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
-        require(
-            bool(np.isfinite(new).all()), "heights_m holds values that are not finite; give metres above the floor."
-        )
-        require(
-            bool((new >= 0).all()), f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor."
-        )
+        finite, above = bool(np.isfinite(new).all()), bool((new >= 0).all())
+        require(finite, "heights_m holds values that are not finite; give metres above the floor.")
+        require(above, f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.")
         self.heights[:] = new
         self.active[:] = 1
         self.ceiling[:] = np.inf

@@ -53,15 +53,7 @@ def _box_walls(container: Container | None, floor_depth_m: float) -> BoxWalls:
 
 
 class LooseSoil:
-    """Parcels of one soil and their surroundings.
-
-    Args:
-        parameters: The soil.
-        fidelity: Numerical effort.
-        field: The dig area.
-        box_field: The soil in the target box.
-        container: The target box, if there is one.
-        floor_depth_m: Depth of the rigid floor below z = 0.
+    """Parcels of one soil and their surroundings: dig area, soil in the target box, the box if there is one.
 
     Attributes:
         population: All parcels; z counts from the rigid floor.
@@ -84,13 +76,8 @@ class LooseSoil:
         self._box = _box_walls(container, floor_depth_m)
         self._level_z = floor_depth_m
         self._density_kg_m3 = parameters.density_kg_m3
-        self.population = Population(
-            WALLS + 3,
-            _laws(parameters, fidelity, self.whole_kg),
-            fidelity.parcel_radius_m,
-            self.whole_kg,
-            fidelity.most_awake,
-        )
+        laws = _laws(parameters, fidelity, self.whole_kg)
+        self.population = Population(WALLS + 3, laws, fidelity.parcel_radius_m, self.whole_kg, fidelity.most_awake)
         self.clear()
 
     def clear(self) -> None:
@@ -101,17 +88,9 @@ class LooseSoil:
     def step(
         self, geometry: ToolGeometry | None, before: Pose | None, now: Pose | None, dt_s: float, *, cutting: bool
     ) -> float:
-        """Move the parcels along with the bucket and let those at rest become ground.
+        """Move the parcels along with the bucket, if there is one, and let those at rest become ground.
 
-        Args:
-            geometry: The bucket, or None if there is none.
-            before: Where it was, or None if it was not there.
-            now: Where it is, or None.
-            dt_s: Duration.
-            cutting: Whether soil entered it in this step.
-
-        Returns:
-            Mass [kg] that landed out of bounds.
+        Cutting: soil entered it in this step. Returns the mass [kg] that landed out of bounds.
         """
         if geometry is None or now is None:
             tool = self._without_tool(dt_s)
@@ -143,16 +122,9 @@ class LooseSoil:
         farthest = _FARTHEST * self._fidelity.parcel_radius_m
         steps = max(self._steps(dt_s), math.ceil(moved / farthest))
         positions, rotations, turn = path(before, now, steps)
-        return ToolPath(
-            1,
-            geometry.profile_t,
-            geometry.planes_t,
-            0.5 * float(geometry.inner_width_m),
-            positions,
-            rotations,
-            (now.position - before.position) / dt_s,
-            turn / dt_s,
-        )
+        shape = geometry.profile_t, geometry.planes_t, 0.5 * float(geometry.inner_width_m)
+        velocities = (now.position - before.position) / dt_s, turn / dt_s
+        return ToolPath(1, *shape, positions, rotations, *velocities)
 
     def _without_tool(self, dt_s: float) -> ToolPath:
         """Return the path of no bucket; a load stays asleep in the one that went away."""

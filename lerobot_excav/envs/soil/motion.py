@@ -71,8 +71,7 @@ def _interpolate(position: Array, travel: Array, rotation: Array, turn: Array, s
 def path(before: Pose, now: Pose, steps: int) -> tuple[Array, Array, Array]:
     """Return the poses before each of some equal steps and after the last, and the whole turn.
 
-    Returns:
-        Positions (steps + 1, 3) [m], rotations (steps + 1, 3, 3), and the rotation vector (3,) in the world [rad].
+    They are positions (steps + 1, 3) [m], rotations (steps + 1, 3, 3), and a rotation vector (3,) in the world [rad].
     """
     turn = _rotation_vector(before.rotation.T @ now.rotation)
     positions, rotations = _interpolate(before.position, now.position - before.position, before.rotation, turn, steps)

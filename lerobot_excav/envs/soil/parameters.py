@@ -8,52 +8,30 @@ from lerobot_excav.errors import require
 
 
 class Origin(NamedTuple):
-    """Where a number comes from, and what it may be.
-
-    Attributes:
-        unit: Its unit.
-        low: Least allowed value.
-        high: Greatest allowed value.
-        kind: `paper`, `datasheet`, `derived`, `tuned` or `guess`.
-        source: Document or reasoning.
-    """
+    """Where a number comes from, and what it may be."""
 
     unit: str
-    low: float
-    high: float
-    kind: str
-    source: str
+    low: float  # least allowed value
+    high: float  # greatest allowed value
+    kind: str  # `paper`, `datasheet`, `derived`, `tuned` or `guess`
+    source: str  # document or reasoning
 
 
 @dataclass(frozen=True, kw_only=True)
 class SoilParameters:
-    """Bulk properties of one soil; `ORIGINS` has source and range of each.
+    """Bulk properties of one soil; `ORIGINS` has source and range of each."""
 
-    Attributes:
-        density_kg_m3: Bulk density, on the ground as in the air.
-        friction_angle_rad: Internal friction; the repose angle is the same number, as in AGX Terrain.
-        cohesion_pa: Cohesion, in the digging force and between parcels.
-        swell: Volume of loosened soil in the bucket over its volume in the ground.
-        steel_friction_angle_rad: Friction between soil and plate.
-        parcel_solid_fraction: Share of a bulk volume that the spheres of its parcels fill.
-        parcel_sliding_scale: Sliding friction between parcels over the tangent of the friction angle.
-        parcel_rolling_scale: The same of rolling friction.
-        ground_sliding_scale: Sliding friction of parcels on the ground over the tangent of the friction angle.
-        ground_rolling_scale: The same of rolling friction.
-        penetration_scale: Factor on the bearing resistance of the cutting edge.
-    """
-
-    density_kg_m3: float
-    friction_angle_rad: float
-    cohesion_pa: float
-    swell: float
-    steel_friction_angle_rad: float
-    parcel_solid_fraction: float = 0.56
-    parcel_sliding_scale: float = 0.62
-    parcel_rolling_scale: float = 0.37
-    ground_sliding_scale: float = 1.7
-    ground_rolling_scale: float = 1.3
-    penetration_scale: float = 1.0
+    density_kg_m3: float  # bulk density, on the ground as in the air
+    friction_angle_rad: float  # internal friction; the repose angle is the same number, as in AGX Terrain
+    cohesion_pa: float  # cohesion, in the digging force and between parcels
+    swell: float  # volume of loosened soil in the bucket over its volume in the ground
+    steel_friction_angle_rad: float  # friction between soil and plate
+    parcel_solid_fraction: float = 0.56  # share of a bulk volume that the spheres of its parcels fill
+    parcel_sliding_scale: float = 0.62  # sliding friction between parcels over the tangent of the friction angle
+    parcel_rolling_scale: float = 0.37  # the same of rolling friction
+    ground_sliding_scale: float = 1.7  # sliding friction of parcels on the ground over the same tangent
+    ground_rolling_scale: float = 1.3  # the same of rolling friction
+    penetration_scale: float = 1.0  # factor on the bearing resistance of the cutting edge
 
     def __post_init__(self) -> None:
         for name, origin in ORIGINS.items():

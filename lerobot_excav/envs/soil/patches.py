@@ -37,21 +37,13 @@ class PatchKind(IntEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patches:
-    """Resistance that the soil can offer to a tool.
+    """Resistance that the soil can offer to a tool."""
 
-    Attributes:
-        points_w: (k, 3) points of the tool [m].
-        normals_w: (k, 3) unit directions in which the soil pushes the tool.
-        limits_n: (k,) greatest push [N], above zero.
-        frictions: (k,) friction coefficient across the normal.
-        kinds: (k,) `PatchKind`.
-    """
-
-    points_w: Array
-    normals_w: Array
-    limits_n: Array
-    frictions: Array
-    kinds: NDArray[np.int8]
+    points_w: Array  # (k, 3) points of the tool [m]
+    normals_w: Array  # (k, 3) unit directions in which the soil pushes the tool
+    limits_n: Array  # (k,) greatest push [N], above zero
+    frictions: Array  # (k,) friction coefficient across the normal
+    kinds: NDArray[np.int8]  # (k,) `PatchKind`
 
     @classmethod
     def none(cls) -> "Patches":
@@ -96,15 +88,8 @@ class Patches:
         Every push and every friction force is full from a share `FULL_SHARE` of the speed on, and in between
         proportional to it, so the wrench is continuous in the motion. Its power is never positive.
         """
-        return patch_wrench(
-            self.points_w,
-            self.normals_w,
-            self.limits_n,
-            self.frictions,
-            np.array(origin_w),
-            np.array(linear_velocity_w),
-            np.array(angular_velocity_w),
-        )
+        motion = np.array(origin_w), np.array(linear_velocity_w), np.array(angular_velocity_w)
+        return patch_wrench(self.points_w, self.normals_w, self.limits_n, self.frictions, *motion)
 
 
 @kernel

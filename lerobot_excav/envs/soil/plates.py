@@ -17,19 +17,12 @@ _PIECE_LENGTH_M = 0.2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OuterFaces:
-    """Samples of the outer faces of a bucket, in its frame.
+    """Samples of the outer faces of a bucket, in its frame."""
 
-    Attributes:
-        points_t: (m, 3) on the outer faces [m].
-        normals_t: (m, 3) unit vectors out of the bucket.
-        areas_m2: (m,) what each stands for.
-        breadths_m: (m,) its share of the breadth of the footing that the profile makes; zero for side plates.
-    """
-
-    points_t: Array
-    normals_t: Array
-    areas_m2: Array
-    breadths_m: Array
+    points_t: Array  # (m, 3) on the outer faces [m]
+    normals_t: Array  # (m, 3) unit vectors out of the bucket
+    areas_m2: Array  # (m,) what each stands for
+    breadths_m: Array  # (m,) its share of the breadth of the footing that the profile makes; zero for side plates
 
     @classmethod
     def of(cls, geometry: ToolGeometry, rows: int) -> "OuterFaces":

@@ -67,16 +67,10 @@ def ground_factors(heights: Array, grid: Grid, points: Array) -> Array:
 def plate_limits(
     overlaps: Array, sinkages: Array, factors: Array, normals: Array, areas: Array, breadths: Array, soil: SoilStrength
 ) -> Array:
-    """Return the greatest push [N] of the soil on each sample of the outer faces.
+    """Return the greatest push [N] of the soil on each of m samples of the outer faces.
 
-    Args:
-        overlaps: (m,) height of the soil above each sample [m].
-        sinkages: (m,) way that each has gone into the soil since it met it [m].
-        factors: (m,) share of the bearing that the slope of the ground leaves.
-        normals: (m, 3) unit vectors out of the bucket.
-        areas: (m,) [m2].
-        breadths: (m,) shares of the breadth of the footing [m].
-        soil: What the soil can bear.
+    The soil stands `overlaps` above a sample [m], which has sunk in by `sinkages` since it met the soil [m]; `factors`
+    are `ground_factors`. Normals (m, 3), areas [m2] and shares in the breadth of the footing [m] as in `OuterFaces`.
     """
     limits = np.zeros(len(overlaps))
     contacts = np.minimum(1.0, overlaps / PLATE_THICKNESS_M)
@@ -99,12 +93,7 @@ def plate_limits(
 
 
 class PlatePressure:
-    """Pressure on the plates of one bucket, which remembers how far each has sunk in.
-
-    Args:
-        faces: Samples of its outer faces.
-        soil: What the soil can bear.
-    """
+    """Pressure on the plates of one bucket, which remembers how far each has sunk in."""
 
     def __init__(self, faces: OuterFaces, soil: SoilStrength) -> None:
         self._faces = faces
@@ -122,13 +111,7 @@ class PlatePressure:
         velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
         sunk = self._sinkages + dt_s * np.einsum("ij,ij->i", velocities, normals)
         self._sinkages = np.where(overlaps > 0.0, np.maximum(0.0, sunk), 0.0)
-        limits = plate_limits(
-            overlaps,
-            self._sinkages,
-            ground_factors(heights_m, grid, raised),
-            normals,
-            faces.areas_m2,
-            faces.breadths_m,
-            self._soil,
-        )
+        factors = ground_factors(heights_m, grid, raised)
+        sizes = faces.areas_m2, faces.breadths_m
+        limits = plate_limits(overlaps, self._sinkages, factors, normals, *sizes, self._soil)
         return Patches.alike(points, -normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)

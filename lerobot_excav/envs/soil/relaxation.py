@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lerobot_excav.envs.soil.arrays import Array, Flags
+from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.errors import ExcavError, require
 
@@ -38,14 +38,7 @@ def mark_around(active: Flags, i: int, j: int) -> None:
 
 @kernel
 def _column_outflow(
-    heights: Array,
-    delta: Array,
-    ceiling: Array,
-    i: int,
-    j: int,
-    rise: tuple[float, float, float],
-    rest: tuple[float, float, float],
-    border_height: float,
+    heights: Array, delta: Array, ceiling: Array, i: int, j: int, rise: Vector, rest: Vector, border_height: float
 ) -> float:
     """Book what one column gives to its neighbours; return what runs over the border."""
     nx, ny = heights.shape
@@ -73,27 +66,13 @@ def _column_outflow(
 
 @kernel
 def sweep(
-    heights: Array,
-    delta: Array,
-    active: Flags,
-    ceiling: Array,
-    cell_m: tuple[float, float],
-    slope_tan: float,
-    border_height: float,
+    heights: Array, delta: Array, active: Flags, ceiling: Array, cell_m: Level, slope_tan: float, border_height: float
 ) -> tuple[float, int]:
-    """Let the active columns flow once.
+    """Let the active columns flow once; heights [m] change in place, and `active` then marks those for the next sweep.
 
-    Args:
-        heights: (nx, ny) heights [m], changed in place.
-        delta: (nx, ny) work array of zeros; zero again afterwards.
-        active: (nx, ny) columns to look at; afterwards those for the next sweep.
-        ceiling: (nx, ny) heights above which soil neither gives nor takes [m]; infinite without a body above.
-        cell_m: Cell size along x and y.
-        slope_tan: Tangent of the repose angle.
-        border_height: Height outside the border [m]; infinite for a closed border.
-
-    Returns:
-        Height [m] that ran over the border, and the number of columns that changed.
+    Soil above the ceiling [m] neither gives nor takes; it is infinite without a body above. `delta` is a work array of
+    zeros, and zero again afterwards. An infinite `border_height` [m] closes the border. All arrays are (nx, ny).
+    Returns the height [m] that ran over the border and the number of columns that changed.
     """
     nx, ny = heights.shape
     diagonal = math.sqrt(cell_m[0] ** 2 + cell_m[1] ** 2)
@@ -122,15 +101,9 @@ def sweep(
 
 
 def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
-    """Let a height field avalanche to full rest inside a closed border.
+    """Let a height field (nx, ny) avalanche to full rest inside a closed border.
 
-    Args:
-        heights_m: (nx, ny) heights above the rigid floor, none negative.
-        cell_size_m: Cell size along x and y.
-        slope_tan: Tangent of the repose angle.
-
-    Returns:
-        (nx, ny) new heights with the same volume, no slope steeper than the repose angle by more than `REST_TAN`.
+    Returns new heights [m] with the same volume, no slope steeper than the repose angle by more than `REST_TAN`.
 
     Raises:
         ConfigurationError: A height is negative or not finite, or a size or slope is not positive.
@@ -138,10 +111,8 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
     """
     heights = np.array(heights_m, dtype=np.float64)
     require(heights.ndim == 2, f"heights_m has shape {heights.shape}; allowed: (nx, ny).")
-    require(
-        bool(np.isfinite(heights).all() and (heights >= 0).all()),
-        "heights_m has values that are not finite or below 0.",
-    )
+    sound = bool(np.isfinite(heights).all() and (heights >= 0).all())
+    require(sound, "heights_m has values that are not finite or below 0.")
     require(
         cell_size_m > 0 and slope_tan > 0, f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0."
     )

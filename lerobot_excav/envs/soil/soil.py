@@ -74,16 +74,13 @@ class Soil:
             container is None or not container.overlaps(extent_m),
             "container overlaps the dig area; move its center_w outside of extent_m.",
         )
-        shape = (
-            _whole_cells(extent_m[0], cell_size_m, "extent_m[0]"),
-            _whole_cells(extent_m[1], cell_size_m, "extent_m[1]"),
-        )
+        nx, ny = (_whole_cells(extent_m[axis], cell_size_m, f"extent_m[{axis}]") for axis in range(2))
         self.parameters: SoilParameters = preset
         self.fidelity = FIDELITIES[fidelity]
         self.container = container
         self.floor_depth_m = float(floor_depth_m)
         self._seed = seed
-        self._field = HeightField(shape, (cell_size_m, cell_size_m), self.floor_depth_m)
+        self._field = HeightField((nx, ny), (cell_size_m, cell_size_m), self.floor_depth_m)
         self._box_field = _box_field(container, cell_size_m)
         self._bucket = Bucket(self.parameters, self.fidelity)
         self._loose = LooseSoil(
@@ -95,8 +92,7 @@ class Soil:
     def reset(self, heights_m: ArrayLike | None = None) -> None:
         """Put new soil in the dig area and remove it everywhere else: box, bucket, air, out of bounds.
 
-        Args:
-            heights_m: (nx, ny) heights above the rigid floor, kept byte for byte; None for an empty floor.
+        Heights (nx, ny) count from the rigid floor and are kept byte for byte; None makes an empty floor.
 
         Raises:
             ConfigurationError: The shape is wrong, or a height is negative or not finite.
@@ -111,13 +107,9 @@ class Soil:
         self._rng = np.random.default_rng(self._seed)
 
     def add_parcels(self, positions_w: ArrayLike, velocities_w: ArrayLike) -> None:
-        """Add loose soil; each parcel brings `parcel_mass_kg` into the ledger.
+        """Add loose soil at (n, 3) centres [m]; each parcel brings `parcel_mass_kg` into the ledger.
 
         Beyond the fidelity's bound on awake parcels, a new one joins its nearest one.
-
-        Args:
-            positions_w: (n, 3) centres [m].
-            velocities_w: (n, 3) [m/s].
 
         Raises:
             ConfigurationError: The shapes are not the same (n, 3), or a value is not finite.
@@ -170,17 +162,8 @@ class Soil:
         com_t = self._payload_com_t(tool)
         if tool is None:
             return Reaction.free(self.payload_mass_kg, com_t)
-        heights = self._field.heights
-        return self._resistance.react(
-            heights,
-            self._loose.weighed_heights(),
-            self._field.grid,
-            tool,
-            self.floor_depth_m,
-            dt_s,
-            self.payload_mass_kg,
-            com_t,
-        )
+        ground = self._field.heights, self._loose.weighed_heights(), self._field.grid
+        return self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
 
     def _give_birth(self, *, is_last: bool) -> None:
         """Turn the soil that has entered the bucket into parcels at rest, where it was."""
@@ -313,11 +296,8 @@ class Soil:
     def height_at(self, xy_w: ArrayLike) -> Array:
         """Return the world z of the ground [m], bilinear between cell centres; z = 0 outside of the extent.
 
-        Args:
-            xy_w: (..., 2) points [m].
-
         Raises:
-            ConfigurationError: The last axis is not 2.
+            ConfigurationError: The last axis of the points (..., 2) is not 2.
         """
         points = np.asarray(xy_w, dtype=np.float64)
         require(points.shape[-1:] == (2,), f"xy_w has shape {points.shape}; allowed: (..., 2).")

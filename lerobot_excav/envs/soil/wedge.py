@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.earthmoving import RAKE_MAX_RAD, RAKE_MIN_RAD
 from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
@@ -30,35 +30,21 @@ _WEDGE_REACH_M = 4.0
 
 
 class SoilStrength(NamedTuple):
-    """What the force model knows of a soil.
+    """What the force model knows of a soil."""
 
-    Attributes:
-        unit_weight: Weight of a volume [N/m3].
-        friction: Friction angle [rad].
-        steel_friction: Angle of friction between soil and steel [rad].
-        cohesion: Cohesion [Pa].
-        bearing_cohesion: Bearing factor of the cohesion [1].
-        bearing_depth: Bearing factor of the depth [1].
-        bearing_width: Bearing factor of the width [1].
-        penetration_scale: Factor on the bearing of the cutting edge [1].
-        table: Rake, failure angle, cohesion and surcharge factor, see `earthmoving.failure_table`.
-    """
-
-    unit_weight: float
-    friction: float
-    steel_friction: float
-    cohesion: float
-    bearing_cohesion: float
-    bearing_depth: float
-    bearing_width: float
-    penetration_scale: float
-    table: Array
+    unit_weight: float  # weight of a volume [N/m3]
+    friction: float  # friction angle [rad]
+    steel_friction: float  # angle of friction between soil and steel [rad]
+    cohesion: float  # [Pa]
+    bearing_cohesion: float  # bearing factor of the cohesion [1]
+    bearing_depth: float  # bearing factor of the depth [1]
+    bearing_width: float  # bearing factor of the width [1]
+    penetration_scale: float  # factor on the bearing of the cutting edge [1]
+    table: Array  # rake, failure angle, cohesion and surcharge factor, see `earthmoving.failure_table`
 
 
 @kernel
-def wedge_area(
-    heights: Array, grid: Grid, edge: tuple[float, float, float], ahead: tuple[float, float], failure: float
-) -> float:
+def wedge_area(heights: Array, grid: Grid, edge: Vector, ahead: Level, failure: float) -> float:
     """Return the area [m2] between failure plane and surface ahead of the edge, to where they first meet.
 
     The surface within one cell of the edge is read one cell ahead: nearer, the bucket has taken it already.
@@ -96,14 +82,7 @@ def table_row(table: Array, rake: float) -> tuple[float, float, float]:
 
 @kernel
 def wedge_force(
-    weighed: Array,
-    grid: Grid,
-    edge: tuple[float, float, float],
-    depth: float,
-    rake: float,
-    ahead: tuple[float, float],
-    width: float,
-    soil: SoilStrength,
+    weighed: Array, grid: Grid, edge: Vector, depth: float, rake: float, ahead: Level, width: float, soil: SoilStrength
 ) -> float:
     """Return the force [N] at which the soil before one slice of the edge fails; formula in `earthmoving`.
 
@@ -136,21 +115,15 @@ def edge_limits(
     grid: Grid,
     edges: Array,
     rake: float,
-    ahead: tuple[float, float],
+    ahead: Level,
     width: float,
     soil: SoilStrength,
 ) -> tuple[Array, Array]:
     """Return the forces [N] at which soil fails before each slice of the edge, and at which it yields to the slice.
 
-    Args:
-        heights: (nx, ny) heights [m].
-        weighed: (nx, ny) heights with everything that lies on the ground and must be lifted with the wedge [m].
-        grid: First cell centre and cell sizes.
-        edges: (n, 3) middles of the slices; z above the rigid floor.
-        rake: Angle of the plate from the horizontal [rad].
-        ahead: Level unit direction in which soil lies before the edge.
-        width: Width of the whole edge [m].
-        soil: What the soil can bear.
+    Heights are (nx, ny) [m], the weighed ones with everything that lies on the ground and must be lifted with the
+    wedge; `edges` are the (n, 3) middles of the slices, z above the rigid floor. The rake of the plate counts from the
+    horizontal [rad]; `ahead` is the level unit direction in which soil lies before the edge of this width [m].
     """
     count = len(edges)
     wedges, bearings = np.zeros(count), np.zeros(count)

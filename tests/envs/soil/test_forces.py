@@ -75,9 +75,8 @@ def test_flat_ground_gives_the_fundamental_equation_of_earthmoving(rake, depth, 
 @settings(max_examples=30)
 def test_a_blade_meets_the_fundamental_equation_of_earthmoving(rake, depth, width, density, cohesion):
     soil = dataclasses.replace(SAND, density_kg_m3=density, cohesion_pa=cohesion)
-    np.testing.assert_allclose(
-        blade_force_n(soil, depth, rake, width), earthmoving_n(soil, depth, rake, width), rtol=0.01
-    )
+    found, expected = (force(soil, depth, rake, width) for force in (blade_force_n, earthmoving_n))
+    np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
 def test_a_heap_ahead_counts_and_turns_the_bucket_if_it_is_on_one_side():

@@ -9,9 +9,7 @@ from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.soil import Soil
 
-TILTED = Container(
-    center_w=np.array([5.0, 0.5, 0.2]), half_extent_m=np.array([1.0, 0.6]), wall_height_m=0.8, yaw_rad=0.4
-)
+TILTED = Container(center_w=[5.0, 0.5, 0.2], half_extent_m=[1.0, 0.6], wall_height_m=0.8, yaw_rad=0.4)
 
 
 def fall(soil, seconds):
@@ -75,7 +73,7 @@ def test_no_parcel_passes_a_wall_below_its_top(x, y, vx, vy, z):
 
 
 def test_soil_heaped_above_the_wall_runs_out_of_the_box():
-    small = Container(center_w=np.array([4.0, 0, 0]), half_extent_m=np.array([0.2, 0.2]), wall_height_m=0.2, yaw_rad=0)
+    small = Container(center_w=[4.0, 0.0, 0.0], half_extent_m=[0.2, 0.2], wall_height_m=0.2, yaw_rad=0.0)
     soil = Soil(container=small)
     for _ in range(100):
         soil.add_parcels([[4.0, 0.0, 0.9]], np.zeros((1, 3)))

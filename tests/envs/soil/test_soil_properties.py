@@ -27,16 +27,11 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def random_soil(preset, fidelity, rng, floor_depth_m):
-    box = Container(
-        center_w=np.array([-2.4, 0.0, 0.0]), half_extent_m=np.array([0.6, 0.6]), wall_height_m=0.4, yaw_rad=0.2
-    )
-    shape = (round(EXTENT_M / CELL_M),) * 2
-    soil = Soil(
-        preset, (EXTENT_M, EXTENT_M), CELL_M, fidelity, int(rng.integers(1000)), box, floor_depth_m=floor_depth_m
-    )
+    box = Container(center_w=[-2.4, 0.0, 0.0], half_extent_m=[0.6, 0.6], wall_height_m=0.4, yaw_rad=0.2)
+    soil = Soil(preset, (EXTENT_M, EXTENT_M), CELL_M, fidelity, int(rng.integers(1000)), box, floor_depth_m)
     x, y = np.meshgrid(soil.x_w, soil.y_w, indexing="ij")
     pile = np.clip(rng.uniform(0.4, 1.1) - rng.uniform(0.2, 0.8) * np.hypot(x, y), 0.0, None)
-    soil.reset(floor_depth_m + pile + rng.uniform(0.0, 0.05, shape))
+    soil.reset(floor_depth_m + pile + rng.uniform(0.0, 0.05, x.shape))
     return soil
 
 

@@ -9,13 +9,7 @@ from lerobot_excav.errors import ConfigurationError
 
 TRIANGLE = np.array([(1.0, 0.0), (0.5, 0.5), (0.0, 0.0)])
 
-
-POSE = {
-    "position_w": np.zeros(3),
-    "rotation_w": np.eye(3),
-    "linear_velocity_w": np.zeros(3),
-    "angular_velocity_w": np.zeros(3),
-}
+POSE = dict.fromkeys(("position_w", "linear_velocity_w", "angular_velocity_w"), np.zeros(3)) | {"rotation_w": np.eye(3)}
 
 
 def tool(**changes):
@@ -68,11 +62,8 @@ def test_a_bad_tool_is_refused(changes, message):
 def test_a_geometry_knows_its_shape_and_no_other():
     geometry = dataclasses.replace(BUCKET, profile_t=TRIANGLE)
     assert geometry.has_shape_of(dataclasses.replace(geometry))
-    for other in (
-        BUCKET,
-        *(dataclasses.replace(geometry, **c) for c in ({"inner_width_m": 2.0}, {"profile_t": 2 * TRIANGLE})),
-    ):
-        assert not geometry.has_shape_of(other)
+    for change in ({"inner_width_m": 2.0}, {"profile_t": 2 * TRIANGLE}, {"profile_t": BUCKET.profile_t}):
+        assert not geometry.has_shape_of(dataclasses.replace(geometry, **change))
 
 
 @pytest.mark.parametrize("pitch", [-3.0, -1.5, 0.0, 0.4, 3.0])

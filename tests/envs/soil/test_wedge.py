@@ -38,9 +38,8 @@ def test_the_wedge_on_a_slope_is_weighed_exactly(failure, slope, depth):
 
 def test_rakes_beyond_the_table_count_as_its_ends():
     for inside, outside in ((20.0, -30.0), (90.0, 100.0), (90.0, 170.0)):
-        assert table_row(SAND.table, math.radians(outside)) == pytest.approx(
-            table_row(SAND.table, math.radians(inside))
-        )
+        found, expected = (table_row(SAND.table, math.radians(rake)) for rake in (outside, inside))
+        assert found == pytest.approx(expected)
     for inside, outside in ((90.0, 120.0), (20.0, 5.0)):
         found = limits(flat(), EDGE, rake_deg=outside)[0]
         assert found == pytest.approx(limits(flat(), EDGE, rake_deg=inside)[0])
@@ -52,11 +51,6 @@ def test_each_slice_has_the_soil_before_it():
     wedges, bearings = limits(field, [[0.0, -0.5, 0.8], [0.0, 0.5, 0.8]])
     assert wedges[1] > 3.0 * wedges[0] > 0.0
     assert bearings[1] > bearings[0] > 0.0
-
-
-def test_slices_add_up_to_the_whole_edge():
-    parts = limits(flat(), [[0.0, y, 0.7] for y in (-0.3, -0.1, 0.1, 0.3)])
-    np.testing.assert_allclose(np.sum(parts, axis=1), np.sum(limits(flat(), EDGE), axis=1))
 
 
 def test_loose_soil_on_the_ground_weighs_on_the_wedge_but_does_not_bury_the_edge():

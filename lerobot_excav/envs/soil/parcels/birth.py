@@ -19,23 +19,14 @@ _PASSES = 3
 
 
 class Bins(NamedTuple):
-    """Soil that waits before the opening of a bucket, in bins of about one parcel; lengths in the tool frame.
+    """Soil that waits before the opening of a bucket, in bins of about one parcel; lengths in the tool frame."""
 
-    Attributes:
-        volumes: (a, b) waiting volumes along the opening, from edge to lip, and across it [m3].
-        x: Of the edge [m].
-        z: Of the edge [m].
-        along_x: x of the way from edge to lip over its squared length [1/m].
-        along_z: z of the same [1/m].
-        width: Inner width of the bucket [m].
-    """
-
-    volumes: Array
-    x: float
-    z: float
-    along_x: float
-    along_z: float
-    width: float
+    volumes: Array  # (a, b) waiting volumes along the opening, from edge to lip, and across it [m3]
+    x: float  # of the edge [m]
+    z: float  # of the edge [m]
+    along_x: float  # x of the way from edge to lip over its squared length [1/m]
+    along_z: float  # z of the same [1/m]
+    width: float  # inner width of the bucket [m]
 
 
 @kernel
@@ -67,10 +58,6 @@ class Intake:
 
     Bins of about one parcel tile the opening. A parcel is born before the fullest bin as soon as all bins together
     hold one, so that never more than one parcel's volume waits, and new parcels keep apart like the soil they were.
-
-    Args:
-        geometry: The bucket.
-        radius_m: Of a parcel.
     """
 
     def __init__(self, geometry: ToolGeometry, radius_m: float) -> None:

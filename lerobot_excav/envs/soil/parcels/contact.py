@@ -10,10 +10,8 @@ makes in one sub-step, before it can fade.
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
-
-Vector = tuple[float, float, float]
 
 SPRINGS = 6
 """Memory of one contact: three components of the sliding spring and three of the rolling spring [m]."""
@@ -43,19 +41,12 @@ _TANGENTIAL_IMPEDANCE = math.sqrt(TANGENTIAL_STIFFNESS)
 
 
 class Law(NamedTuple):
-    """Coefficients of one kind of contact.
+    """Coefficients of one kind of contact."""
 
-    Attributes:
-        stiffness: Of the normal spring [N/m].
-        sliding: Coefficient of sliding friction.
-        rolling: Coefficient of rolling friction, at the radius of the parcel.
-        cohesion: Pull of a closed contact per cross-section of the smaller partner [Pa].
-    """
-
-    stiffness: float
-    sliding: float
-    rolling: float
-    cohesion: float
+    stiffness: float  # of the normal spring [N/m]
+    sliding: float  # coefficient of sliding friction
+    rolling: float  # coefficient of rolling friction, at the radius of the parcel
+    cohesion: float  # pull of a closed contact per cross-section of the smaller partner [Pa]
 
 
 @kernel
@@ -74,12 +65,7 @@ def dot(a: Vector, b: Vector) -> float:
 def normal_force(overlap: float, separation_speed: float, stiffness: float, impedance: float, radius: float) -> float:
     """Return the normal force [N] of a contact; it never pulls.
 
-    Args:
-        overlap: How deep the partners overlap [m].
-        separation_speed: Their speed away from each other [m/s].
-        stiffness: Of the normal spring [N/m].
-        impedance: Root of stiffness times effective mass [kg/s].
-        radius: Radius of the smaller partner [m].
+    The impedance is the root of stiffness times effective mass [kg/s], the radius [m] that of the smaller partner.
     """
     force = stiffness * min(overlap, LARGEST_OVERLAP * radius) - 2.0 * NORMAL_DAMPING * impedance * separation_speed
     if separation_speed > 0.0:
@@ -101,16 +87,8 @@ def spring_force(
 ) -> Vector:
     """Stretch one spring of a contact and return its force [N], at most `limit` in size.
 
-    Args:
-        springs: (n, 6) memories of contacts [m], changed in place.
-        row: Which contact.
-        first: 0 for the sliding spring, 3 for the rolling one.
-        normal: Unit normal of the contact.
-        velocity: Velocity that stretches the spring [m/s]; its normal part does not count.
-        stiffness: Of the spring [N/m].
-        damping: Of its dashpot [kg/s].
-        limit: Largest force [N].
-        dt: Duration [s].
+    The spring is one of (n, 6) memories [m], which change in place: that of a contact `row`, `first` 0 for sliding or 3
+    for rolling. The velocity [m/s] stretches it, but for its normal part; stiffness is in N/m and damping in kg/s.
     """
     along = dot(velocity, normal)
     v0, v1, v2 = (velocity[0] - along * normal[0], velocity[1] - along * normal[1], velocity[2] - along * normal[2])

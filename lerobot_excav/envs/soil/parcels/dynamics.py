@@ -11,7 +11,7 @@ from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
-from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket
+from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket, turned
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State
 
 LARGEST_SPEED_M_S = 12.0
@@ -36,12 +36,7 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
     w = (tool.angular[0], tool.angular[1], tool.angular[2])
     for i in range(len(state.masses)):
         if state.asleep[i]:
-            q = (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2])
-            arm = (
-                rotation[0, 0] * q[0] + rotation[0, 1] * q[1] + rotation[0, 2] * q[2],
-                rotation[1, 0] * q[0] + rotation[1, 1] * q[1] + rotation[1, 2] * q[2],
-                rotation[2, 0] * q[0] + rotation[2, 1] * q[1] + rotation[2, 2] * q[2],
-            )
+            arm = turned(rotation, (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2]))
             turning = cross(w, arm)
             for a in range(3):
                 state.positions[i, a] = position[a] + arm[a]
@@ -53,8 +48,7 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
 def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
     """Add the forces of touching parcels on each other; change the memory of their contacts.
 
-    Returns:
-        Fastest closing speed between a sleeping parcel and one that is awake [m/s].
+    Returns the fastest closing speed between a sleeping parcel and one that is awake [m/s].
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
     masses, radii, asleep = state.masses, state.radii, state.asleep
@@ -136,21 +130,11 @@ def advance(
     dt: float,
     steps: int,
 ) -> tuple[Pairs, Pairs, float]:
-    """Advance all parcels by some sub-steps.
+    """Advance all parcels, in place, by some sub-steps of `dt` [s].
 
-    Args:
-        state: All parcels, changed in place.
-        pairs: Neighbours of the last call.
-        spare: Another list as large, whose content does not matter.
-        old_rows: (n,) row of each parcel in that call, -1 for a new one.
-        tool: The bucket; its arrays hold the poses before each sub-step and after the last.
-        site: The ground.
-        laws: Coefficients of the contacts.
-        dt: Duration of a sub-step [s].
-        steps: Number of sub-steps.
-
-    Returns:
-        The neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
+    `pairs` are the neighbours of the last call, in which the parcels had the rows `old_rows` (n,), -1 for a new one;
+    `spare` is another list as large, whose content does not matter.
+    Returns the neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
     """
     highest = max(site.heights.max(), site.level_z)
     if site.box.half_x > 0.0:

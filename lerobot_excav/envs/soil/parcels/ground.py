@@ -3,10 +3,10 @@
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
-from lerobot_excav.envs.soil.parcels.contact import Law, Vector, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.contact import Law, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.plates import BoxWalls, to_box
 from lerobot_excav.envs.soil.parcels.store import SHELTERED, TOUCHES_BOX_FLOOR, TOUCHES_GROUND, TOUCHES_OUTSIDE, State
 
@@ -19,27 +19,18 @@ LIFT = 0.05
 
 
 class Site(NamedTuple):
-    """What parcels can land on; z counts from the rigid floor.
+    """What parcels can land on; z counts from the rigid floor."""
 
-    Attributes:
-        heights: (nx, ny) of the dig area [m].
-        grid: Its first cell centre and cell sizes.
-        box_heights: (mx, my) of the soil in the target box above its floor [m].
-        box_grid: Its grid, in the plane of the box.
-        box: The box.
-        level_z: Height of the ground around the dig area [m].
-    """
-
-    heights: Array
-    grid: Grid
-    box_heights: Array
-    box_grid: Grid
+    heights: Array  # (nx, ny) of the dig area [m]
+    grid: Grid  # its first cell centre and cell sizes
+    box_heights: Array  # (mx, my) of the soil in the target box above its floor [m]
+    box_grid: Grid  # its grid, in the plane of the box
     box: BoxWalls
-    level_z: float
+    level_z: float  # height of the ground around the dig area [m]
 
 
 @kernel
-def _surface(heights: Array, grid: Grid, x: float, y: float) -> tuple[float, float, float]:
+def _surface(heights: Array, grid: Grid, x: float, y: float) -> Vector:
     """Return height and slopes of the bilinear surface through the cell centres; level beyond the outer ones."""
     nx, ny = heights.shape
     u = min(max((x - grid.x0) / grid.dx, 0.0), nx - 1.0)

@@ -46,9 +46,8 @@ _ACCELERATION_TIME_S = 0.1
 def find_load(state: State, tool: ToolPath) -> tuple[float, float, float, int]:
     """Mark the parcels, in `state.load`, that lie in the bucket's last pose or in the heap above its opening and rim.
 
-    Returns:
-        Mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; share of it that
-        flows; 1 if it touches the ground, else 0.
+    Returns mass [kg] and mean square speed [m2/s2], relative to the bucket, of the load that is awake; the share of it
+    that flows; 1 if it touches the ground, else 0.
     """
     step = len(tool.positions) - 1
     position, rotation = tool.positions[step], tool.rotations[step]

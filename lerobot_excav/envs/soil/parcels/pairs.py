@@ -19,29 +19,17 @@ _PAIRS_PER_PARCEL = 16
 
 
 class Pairs(NamedTuple):
-    """Neighbours i < j in rows of i. The arrays have room to spare; only the first `start[n]` pairs count.
+    """Neighbours i < j in rows of i. The arrays have room to spare; only the first `start[n]` pairs count."""
 
-    Attributes:
-        start: (capacity + 1,) where the row of each parcel begins.
-        partner: (room,) j of each pair.
-        closed: (room,) 1 if the pair touched when last looked at.
-        springs: (room, 6) memory of each contact [m].
-        anchors: (capacity, 3) positions at which the list was made [m].
-        first: (room,) work space: i of the pairs in the order found.
-        second: (room,) work space: j of the same.
-        last: (cells,) work space: the last parcel of each cell.
-        before: (capacity,) work space: the parcel before each one in its cell.
-    """
-
-    start: Indices
-    partner: Indices
-    closed: Flags
-    springs: Array
-    anchors: Array
-    first: Indices
-    second: Indices
-    last: Indices
-    before: Indices
+    start: Indices  # (capacity + 1,) where the row of each parcel begins
+    partner: Indices  # (room,) j of each pair
+    closed: Flags  # (room,) 1 if the pair touched when last looked at
+    springs: Array  # (room, 6) memory of each contact [m]
+    anchors: Array  # (capacity, 3) positions at which the list was made [m]
+    first: Indices  # (room,) work space: i of the pairs in the order found
+    second: Indices  # (room,) work space: j of the same
+    last: Indices  # (cells,) work space: the last parcel of each cell
+    before: Indices  # (capacity,) work space: the parcel before each one in its cell
 
 
 def room_for(capacity: int) -> Pairs:
@@ -65,13 +53,10 @@ def enlarged(pairs: Pairs, capacity: int) -> Pairs:
     new = room_for(capacity)
     while len(new.partner) < len(pairs.partner):
         new = _more_room(new)
-    for source, target in (
-        (pairs.start, new.start),
-        (pairs.partner, new.partner),
-        (pairs.closed, new.closed),
-        (pairs.springs, new.springs),
-    ):
-        target[: len(source)] = source
+    new.start[: len(pairs.start)] = pairs.start
+    new.partner[: len(pairs.partner)] = pairs.partner
+    new.closed[: len(pairs.closed)] = pairs.closed
+    new.springs[: len(pairs.springs)] = pairs.springs
     return new
 
 
@@ -152,13 +137,8 @@ def _sort_rows(
 def find_pairs(positions: Array, radii: Array, asleep: Flags, old: Pairs, old_rows: Indices, new: Pairs) -> Pairs:
     """List the neighbours again; two parcels that both sleep are none.
 
-    Args:
-        positions: (n, 3) centres [m].
-        radii: (n,) [m].
-        asleep: (n,) flags.
-        old: The list before, whose memory is kept.
-        old_rows: (n,) row of each parcel in that list, -1 for a new one. Must grow with the row.
-        new: Where the list is written; another one is returned if that is too small.
+    The memory of the list `old` is kept, in which each parcel had a row `old_rows` (n,), growing, or -1 for a new one.
+    The list is written to `new`; another one is returned if that is too small.
     """
     n = len(positions)
     count = _find_near(positions, radii, asleep, new.first, new.second, new.last, new.before)

@@ -3,10 +3,10 @@
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
-from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, Vector, cross, dot, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, cross, dot, forget, wall_contact
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 
 CLOSEST = 0.25
@@ -19,54 +19,32 @@ _HAIR_M = 1e-9
 
 
 class BoxWalls(NamedTuple):
-    """A target box; z counts from the rigid floor.
+    """A target box; z counts from the rigid floor."""
 
-    Attributes:
-        x: Centre of its floor along x [m].
-        y: The same along y [m].
-        floor_z: Height of its floor [m].
-        half_x: Half of its inner length along its own x [m]; below zero without a box.
-        half_y: The same along its own y [m].
-        top_z: Height of the top of its walls [m].
-        cos: Cosine of its yaw.
-        sin: Sine of its yaw.
-    """
-
-    x: float
-    y: float
-    floor_z: float
-    half_x: float
-    half_y: float
-    top_z: float
-    cos: float
-    sin: float
+    x: float  # centre of its floor along x [m]
+    y: float  # the same along y [m]
+    floor_z: float  # height of its floor [m]
+    half_x: float  # half of its inner length along its own x [m]; below zero without a box
+    half_y: float  # the same along its own y [m]
+    top_z: float  # height of the top of its walls [m]
+    cos: float  # cosine of its yaw
+    sin: float  # sine of its yaw
 
 
 NO_BOX = BoxWalls(0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 1.0, 0.0)
 
 
 class ToolPath(NamedTuple):
-    """The bucket during one step.
+    """The bucket during one step."""
 
-    Attributes:
-        present: 1 if there is one, else 0.
-        profile: (n, 2) points from edge to lip, tool frame [m].
-        planes: (n + 2, 4) half-spaces of its inside: opening, plates, right, left.
-        half_width: Of the inside [m].
-        positions: (steps + 1, 3) origin before each sub-step and after the last [m], z above the rigid floor.
-        rotations: (steps + 1, 3, 3) the same.
-        linear: (3,) velocity of the origin [m/s].
-        angular: (3,) angular velocity [rad/s].
-    """
-
-    present: int
-    profile: Array
-    planes: Array
-    half_width: float
-    positions: Array
-    rotations: Array
-    linear: Array
-    angular: Array
+    present: int  # 1 if there is one, else 0
+    profile: Array  # (n, 2) points from edge to lip, tool frame [m]
+    planes: Array  # (n + 2, 4) half-spaces of its inside: opening, plates, right, left
+    half_width: float  # of the inside [m]
+    positions: Array  # (steps + 1, 3) origin before each sub-step and after the last [m], z above the rigid floor
+    rotations: Array  # (steps + 1, 3, 3) the same
+    linear: Array  # (3,) velocity of the origin [m/s]
+    angular: Array  # (3,) angular velocity [rad/s]
 
 
 @kernel

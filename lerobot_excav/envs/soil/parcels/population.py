@@ -38,17 +38,11 @@ _FIRST_CAPACITY = 1024
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Landed:
-    """Parcels that have become ground.
+    """Parcels that have become ground."""
 
-    Attributes:
-        points_w: (n, 2) where they lay [m].
-        masses_kg: (n,) their masses.
-        place: (n,) what they lay on, one of `store.TOUCHES_…`.
-    """
-
-    points_w: Array
-    masses_kg: Array
-    place: Flags
+    points_w: Array  # (n, 2) where they lay [m]
+    masses_kg: Array  # (n,) their masses
+    place: Flags  # (n,) what they lay on, one of `store.TOUCHES_…`
 
     @property
     def is_on_ground(self) -> Bools:
@@ -62,17 +56,10 @@ class Landed:
 
 
 class Population:
-    """All parcels.
+    """All parcels, each in one row of `state`, where z counts from the rigid floor.
 
-    Args:
-        plates: Number of plates that they may touch, those of the bucket and of the box together.
-        laws: Coefficients of their contacts.
-        radius_m: Of a whole parcel.
-        mass_kg: Of a whole parcel.
-        most_awake: Bound on the awake ones; above it, a new parcel joins its nearest one instead.
-
-    Attributes:
-        state: One row per parcel; z counts from the rigid floor.
+    They may touch so many plates, those of the bucket and of the box together. Radius and mass are those of a whole
+    parcel. Above the bound on the awake ones, a new parcel joins its nearest one instead.
     """
 
     def __init__(self, plates: int, laws: Laws, radius_m: float, mass_kg: float, most_awake: int) -> None:

@@ -19,45 +19,25 @@ OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED = range(3)
 
 
 class State(NamedTuple):
-    """Arrays of all parcels in the form that kernels take; z counts from the rigid floor.
+    """Arrays of all parcels in the form that kernels take; z counts from the rigid floor."""
 
-    Attributes:
-        positions: (n, 3) centres [m].
-        velocities: (n, 3) [m/s].
-        spins: (n, 3) angular velocities [rad/s].
-        masses: (n,) [kg].
-        radii: (n,) [m].
-        forces: (n, 3) of the present sub-step [N].
-        torques: (n, 3) of the present sub-step [N m].
-        places_t: (n, 3) centres in the tool frame, of parcels asleep in the bucket [m].
-        calm_s: (n,) how long each has rested on the ground [s].
-        asleep: (n,) 1 if it rests in the bucket and moves with it.
-        load: (n,) 1 if it belongs to the bucket's load.
-        ground: (n,) what it last touched below in this step, one of `TOUCHES_…`.
-        on_ground: (n,) 1 if it touches the ground in this sub-step.
-        shell: (n,) where it is at the bucket, one of `OFF_BUCKET`, `OUTSIDE_OF_SHELL`, `SHELTERED`.
-        near_plate: (n,) 1 if it touched a plate of the bucket when last looked at.
-        ground_springs: (n, 6) memory of the contact with the ground [m].
-        plate_springs: (n, plates, 6) memory of the contacts with plates of bucket and box [m].
-    """
-
-    positions: Array
-    velocities: Array
-    spins: Array
-    masses: Array
-    radii: Array
-    forces: Array
-    torques: Array
-    places_t: Array
-    calm_s: Array
-    asleep: Flags
-    load: Flags
-    ground: Flags
-    on_ground: Flags
-    shell: Flags
-    near_plate: Flags
-    ground_springs: Array
-    plate_springs: Array
+    positions: Array  # (n, 3) centres [m]
+    velocities: Array  # (n, 3) [m/s]
+    spins: Array  # (n, 3) angular velocities [rad/s]
+    masses: Array  # (n,) [kg]
+    radii: Array  # (n,) [m]
+    forces: Array  # (n, 3) of the present sub-step [N]
+    torques: Array  # (n, 3) of the present sub-step [N m]
+    places_t: Array  # (n, 3) centres in the tool frame, of parcels asleep in the bucket [m]
+    calm_s: Array  # (n,) how long each has rested on the ground [s]
+    asleep: Flags  # (n,) 1 if it rests in the bucket and moves with it
+    load: Flags  # (n,) 1 if it belongs to the bucket's load
+    ground: Flags  # (n,) what it last touched below in this step, one of `TOUCHES_…`
+    on_ground: Flags  # (n,) 1 if it touches the ground in this sub-step
+    shell: Flags  # (n,) where it is at the bucket, one of `OFF_BUCKET`, `OUTSIDE_OF_SHELL`, `SHELTERED`
+    near_plate: Flags  # (n,) 1 if it touched a plate of the bucket when last looked at
+    ground_springs: Array  # (n, 6) memory of the contact with the ground [m]
+    plate_springs: Array  # (n, plates, 6) memory of the contacts with plates of bucket and box [m]
 
 
 def empty_state(count: int, plates: int) -> State:

@@ -81,13 +81,3 @@ def test_the_fullest_bin_gives_first():
     before = intake.waiting_m3
     intake.births(before, np.random.default_rng(0))
     assert np.argmin(intake.bins.volumes) == np.ravel_multi_index((2, 3), intake.bins.volumes.shape)
-
-
-def test_births_repeat_with_the_generator():
-    def born(seed):
-        intake = Intake(BUCKET, RADIUS)
-        intake.bins.volumes[:] = 0.7 * PARCEL_M3
-        return intake.births(PARCEL_M3, np.random.default_rng(seed))
-
-    np.testing.assert_array_equal(born(3), born(3))
-    assert not np.array_equal(born(3), born(4))

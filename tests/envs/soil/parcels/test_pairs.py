@@ -74,17 +74,6 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(seed):
         np.testing.assert_allclose(kept[pair], springs, rtol=1e-9, atol=1e-12)
 
 
-@given(seed=st.integers(0, 2**16))
-@settings(max_examples=60)
-def test_forces_between_parcels_keep_linear_and_angular_momentum(seed):
-    state = random_state(np.random.default_rng(seed), 12, 0.1)
-    press_pairs(state, first_list(state), LAWS.parcel, DT)
-    moments = np.cross(state.positions, state.forces) + state.torques
-    assert np.abs(state.forces).max() > 1.0
-    np.testing.assert_allclose(state.forces.sum(axis=0), 0.0, atol=1e-9)
-    np.testing.assert_allclose(moments.sum(axis=0), 0.0, atol=1e-9)
-
-
 @given(seed=st.integers(0, 2**16), capacity=st.sampled_from([23, 200]))
 @settings(max_examples=60)
 def test_memory_survives_a_new_list_in_which_parcels_left_and_joined(seed, capacity):

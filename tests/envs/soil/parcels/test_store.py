@@ -6,9 +6,6 @@ from hypothesis import strategies as st
 
 from lerobot_excav.envs.soil.parcels.store import copy_rows, empty_state, keep, rows
 
-WORK_SPACE = {"forces", "torques"}
-"""Fields that every sub-step makes new."""
-
 
 def filled(rng, count):
     """Return a state with other numbers in every place."""
