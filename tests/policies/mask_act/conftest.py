@@ -63,14 +63,10 @@ def square_mask(batch_size, *, top, left, size=12):
     return mask
 
 
-@pytest.fixture
-def config():
-    return make_config
-
-
-@pytest.fixture
-def policy():
-    return make_policy
+config = pytest.fixture(lambda: make_config)
+policy = pytest.fixture(lambda: make_policy)
+batch = pytest.fixture(lambda: make_batch)
+mask = pytest.fixture(lambda: square_mask)
 
 
 @pytest.fixture
@@ -85,13 +81,3 @@ def awake():
         return agent
 
     return build
-
-
-@pytest.fixture
-def batch():
-    return make_batch
-
-
-@pytest.fixture
-def mask():
-    return square_mask

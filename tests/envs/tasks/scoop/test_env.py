@@ -106,9 +106,6 @@ def test_mask_shows_the_commanded_patch_of_the_soil_as_the_depth_of_the_picture_
     assert seeing_env.target.contains(seeing_env.camera.points_w(seeing_env.depth_m()))[mask].all()
     center_w = np.nanmean(points_w[mask], axis=0)
     assert np.hypot(*(center_w - seeing_env.target.center_w)[:2]) < 0.25
-    # Where nothing stands before the patch, the picture's own depth tells the same mask.
-    seen_w = seeing_env.camera.points_w(seeing_env.depth_m())
-    assert np.array_equal(seeing_env.target.contains(seen_w) & mask, mask)
 
 
 def test_all_targets_of_a_scene_are_seen_and_paired_resets_differ_in_the_mask_only(seeing_env):
@@ -139,8 +136,7 @@ def test_a_new_command_shows_its_patch_on_the_soil_as_it_lies_then(seeing_env):
 
 def test_the_operator_follows_a_new_command_before_it_digs(env):
     env.reset(options={"scene_id": 1, "target_id": 0, "commands": [(5, 3)]})
-    *_, info = operate(env)
-    metrics = info["episode_metrics"]
+    metrics = operate(env)[2]["episode_metrics"]
     assert metrics["commands"] == [[0, 0], [5, 3]]
     assert metrics["is_success"]
 
