@@ -38,12 +38,7 @@ CASES: tuple[tuple[str, str, str, int, int, int, dict[str, Any]], ...] = (
     ("grasp-random", GRASP, "random", 40, 8, 0, {"retarget_frame": 15, "episode_length": 40}),
     ("grasp-noise", GRASP, "random", 30, 9, 3, {"mask_noise": "shift", "mask_noise_px": 4, "fps": 25}),
     (
-        "grasp-blind",
-        GRASP,
-        "random",
-        60,
-        1,
-        1,
+        *("grasp-blind", GRASP, "random", 60, 1, 1),
         {"obs_type": "agent_pos", "mask_condition": "zero", "episode_length": 60},
     ),
     ("grasp-large", GRASP, "random", 5, 1, 1, {"observation_height": 144, "observation_width": 192}),

@@ -122,13 +122,8 @@ def real_time_factor(seed: int, fidelity: str = "standard") -> dict[str, float]:
     idle = timed_steps(soil, [None] * 200)
     values = {
         "real_time_factor": TICK_S * 1e3 / ms.mean(),
-        **{
-            "mean_ms": ms.mean(),
-            "p50_ms": np.percentile(ms, 50),
-            "p95_ms": np.percentile(ms, 95),
-            "worst_ms": ms.max(),
-        },
-        "idle_ms": idle.ms.mean(),
+        **{"mean_ms": ms.mean(), "p50_ms": np.percentile(ms, 50), "p95_ms": np.percentile(ms, 95)},
+        **{"worst_ms": ms.max(), "idle_ms": idle.ms.mean()},
         **{"mean_parcels": parcels.mean(), "most_parcels": parcels.max()},
         **{"mean_awake": awake.mean(), "most_awake": awake.max()},
         "retained_mass_kg": retained,

@@ -105,19 +105,15 @@ SCENES = np.array([100.0, 200.0, 400.0, 150.0])
 
 
 @pytest.mark.parametrize(
-    ("estimate", "exact"),
+    ("estimate", "values", "exact"),
     [
-        pytest.param(lambda rng: statistics.bootstrap_mean(np.full(7, 3.0), rng), 3.0, id="equal values"),
-        pytest.param(
-            lambda rng: statistics.bootstrap_ratio(0.8 * SCENES, SCENES, rng), 0.8, id="a ratio of proportional values"
-        ),
-        pytest.param(
-            lambda rng: statistics.paired_bootstrap(SCENES, SCENES + 5.0, rng), 5.0, id="pairs that differ alike"
-        ),
+        (statistics.bootstrap_mean, [np.full(7, 3.0)], 3.0),
+        (statistics.bootstrap_ratio, [0.8 * SCENES, SCENES], 0.8),
+        (statistics.paired_bootstrap, [SCENES, SCENES + 5.0], 5.0),
     ],
 )
-def test_what_is_the_same_on_all_scenes_has_no_spread(estimate, exact, rng):
-    interval = estimate(rng)
+def test_what_is_the_same_on_all_scenes_has_no_spread(estimate, values, exact, rng):
+    interval = estimate(*values, rng)
     assert (interval.low, interval.estimate, interval.high) == pytest.approx((exact, exact, exact))
 
 

@@ -32,9 +32,7 @@ def operate(env):
 
 @pytest.fixture(scope="module")
 def env():
-    env = ExcavatorEnv(obs_type="agent_pos")
-    yield env
-    env.close()
+    return ExcavatorEnv(obs_type="agent_pos")
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +96,8 @@ def test_a_soil_of_ones_own_shapes_the_pile_and_is_dug():
 
 
 def test_mask_shows_the_commanded_patch_of_the_soil_as_the_depth_of_the_picture_does(seeing_env):
-    observation, _ = seeing_env.reset(seed=2)
+    mask = mask_of(seeing_env.reset(seed=2)[0])
     points_w = seeing_env.renderer.terrain_points_w()
-    mask = mask_of(observation)
     assert np.array_equal(mask, seeing_env.target.contains(points_w))
     # Where nothing stands before the patch, the picture's own depth tells the same.
     assert seeing_env.target.contains(seeing_env.camera.points_w(seeing_env.depth_m()))[mask].all()
