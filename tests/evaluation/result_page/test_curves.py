@@ -1,6 +1,6 @@
 import pytest
 
-from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.result_page.contents import CurveSource
 from lerobot_excav.evaluation.result_page.curves import read_curve
 
@@ -37,8 +37,3 @@ def test_points_stand_by_their_step_and_files_whose_name_is_no_step_are_no_point
 def test_a_curve_is_of_one_set_of_scenes_and_one_condition(curve, changes, message):
     with pytest.raises(DatasetError, match=message):
         curve(_100={}, _200=changes)
-
-
-def test_a_point_is_of_one_condition(curve):
-    with pytest.raises(ConfigurationError, match=r"200\.jsonl mixes mask conditions"):
-        curve(_200={"at_1": {"mask_condition": "zero"}})
