@@ -168,9 +168,7 @@ def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line,
     assert first != second
 
 
-def test_a_row_without_its_checkpoint_has_its_command_and_one_run_by_hand_has_none(
-    finished, tmp_path, grasp_line, write_evaluation
-):
+def test_a_row_may_lack_its_checkpoint_or_any_record(finished, tmp_path, grasp_line, write_evaluation):
     write_evaluation("test/later", [grasp_line(0)], tmp_path / "gone")
     row = make_page(finished).rows[2]
     assert row.origin.training is None

@@ -47,9 +47,7 @@ def stem(network):
 
 def make_batch(batch_size=3, *, seed=0, actions=False):
     generator = torch.Generator().manual_seed(seed)
-    batch = {
-        key: torch.rand(batch_size, *feature.shape, generator=generator) for key, feature in INPUT_FEATURES.items()
-    }
+    batch = {key: torch.rand(batch_size, *ft.shape, generator=generator) for key, ft in INPUT_FEATURES.items()}
     batch[MASK] = square_mask(batch_size, top=8, left=16)
     if actions:
         batch["action"] = torch.randn(batch_size, CHUNK, 4, generator=generator)

@@ -81,12 +81,10 @@ def test_fidelity_reaches_the_soil_and_changes_its_course():
 
 
 def test_a_soil_of_ones_own_shapes_the_pile_and_is_dug():
-    heavy = SoilParameters(
-        density_kg_m3=1700.0, friction_angle_rad=0.7, cohesion_pa=500.0, swell=1.0, steel_friction_angle_rad=0.4
-    )
-    env, sand, again = (
-        ExcavatorEnv(soil=soil, obs_type="agent_pos", episode_length=1) for soil in (heavy, "sand", PRESETS["sand"])
-    )
+    angles = {"friction_angle_rad": 0.7, "steel_friction_angle_rad": 0.4}
+    heavy = SoilParameters(density_kg_m3=1700.0, cohesion_pa=500.0, swell=1.0, **angles)
+    settings = {"obs_type": "agent_pos", "episode_length": 1}
+    env, sand, again = (ExcavatorEnv(soil=soil, **settings) for soil in (heavy, "sand", PRESETS["sand"]))
     for each in (env, sand, again):
         each.reset(seed=2)
     assert env.worksite.soil.parameters is heavy
