@@ -27,13 +27,7 @@ _LONGEST_S = 40
 
 
 def ticks_per_picture(phase: str, *, payload_kg: float, airborne_kg: float) -> int:
-    """Return how many ticks pass until the next picture: one while soil moves, more between.
-
-    Args:
-        phase: What the operator is doing.
-        payload_kg: Soil in the bucket.
-        airborne_kg: Loose soil outside of it.
-    """
+    """Return the ticks until the next picture: few while soil is in the cutting bucket or loose outside, else more."""
     loads = phase in ("cut", "curl") and payload_kg > 0.0
     return 1 if loads or airborne_kg > _MOVING_KG else _QUICK_TICKS
 

@@ -35,10 +35,8 @@ def policy_configs(*, height: int, width: int, chunk_size: int) -> dict[str, Pre
     shared: dict[str, Any] = {
         "input_features": {**dict.fromkeys(CAMERAS, image), "observation.state": state},
         "output_features": {"action": PolicyFeature(type=FeatureType.ACTION, shape=(ACTION_SIZE,))},
-        "chunk_size": chunk_size,
-        "n_action_steps": chunk_size,
-        "device": "cpu",
-        "pretrained_backbone_weights": None,
+        **{"chunk_size": chunk_size, "n_action_steps": chunk_size},
+        **{"device": "cpu", "pretrained_backbone_weights": None},
     }
     return {
         "act": ACTConfig(**shared),

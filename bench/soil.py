@@ -106,11 +106,7 @@ def pile(preset: str = "sand", fidelity: str = "standard", seed: int = 0, cell_s
 
 
 def real_time_factor(seed: int, fidelity: str = "standard") -> dict[str, float]:
-    """Time one scripted cycle on this machine.
-
-    Args:
-        seed: Seed of the soil; it changes the jitter of new parcels, hardly the time.
-        fidelity: Numerical effort.
+    """Time one scripted cycle on this machine; the seed changes the jitter of new parcels, hardly the time.
 
     Returns:
         `real_time_factor` (simulated over computing time of the cycle); `mean_ms`, `p50_ms`, `p95_ms` and `worst_ms`
@@ -126,15 +122,10 @@ def real_time_factor(seed: int, fidelity: str = "standard") -> dict[str, float]:
     idle = timed_steps(soil, [None] * 200)
     values = {
         "real_time_factor": TICK_S * 1e3 / ms.mean(),
-        "mean_ms": ms.mean(),
-        "p50_ms": np.percentile(ms, 50),
-        "p95_ms": np.percentile(ms, 95),
-        "worst_ms": ms.max(),
-        "idle_ms": idle.ms.mean(),
-        "mean_parcels": parcels.mean(),
-        "most_parcels": parcels.max(),
-        "mean_awake": awake.mean(),
-        "most_awake": awake.max(),
+        **{"mean_ms": ms.mean(), "p50_ms": np.percentile(ms, 50), "p95_ms": np.percentile(ms, 95)},
+        **{"worst_ms": ms.max(), "idle_ms": idle.ms.mean()},
+        **{"mean_parcels": parcels.mean(), "most_parcels": parcels.max()},
+        **{"mean_awake": awake.mean(), "most_awake": awake.max()},
         "retained_mass_kg": retained,
     }
     return {name: float(value) for name, value in values.items()}

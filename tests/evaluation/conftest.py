@@ -33,17 +33,8 @@ def line(task, number, /, **changes):
     return {**place, **SHARED, "shown_target_id": target, **task, **grasped, **changes}
 
 
-scoop, grasp = partial(line, SCOOP), partial(line, GRASP)
-
-
-@pytest.fixture
-def scoop_line():
-    return scoop
-
-
-@pytest.fixture
-def grasp_line():
-    return grasp
+scoop_line = pytest.fixture(lambda: partial(line, SCOOP))
+grasp_line = pytest.fixture(lambda: partial(line, GRASP))
 
 
 @pytest.fixture

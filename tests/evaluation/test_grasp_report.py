@@ -1,6 +1,6 @@
 import pytest
 
-from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.report import make_report
 from lerobot_excav.evaluation.report_text import report_text
 
@@ -98,9 +98,3 @@ def test_runs_on_the_same_scenes_are_compared_by_success_and_return(make_run, li
     assert success.p_value == pytest.approx(2 / 2**6)
     assert total.difference.estimate == pytest.approx(470.0)
     assert "| success [%] | +60.0" in report_text(report)
-
-
-def test_tasks_are_not_mixed(make_run, grasp_line, scoop_line):
-    digging, grasping = make_run("d", [scoop_line(0)]), make_run("g", [grasp_line(0)])
-    with pytest.raises(DatasetError, match=r"d is of Scoop-v0 and g of FR5Grasp-v0"):
-        make_report([digging, grasping])

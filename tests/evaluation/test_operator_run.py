@@ -48,13 +48,6 @@ def test_the_operators_file_is_read_like_that_of_a_policy(tmp_path, capsys):
     assert "3/3" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_the_scripted_operator_fills_the_box_without_pictures(tmp_path):
-    evaluate(tmp_path / "o.jsonl", settings=played(scenes=1))
-    (episode,) = read_evaluation(tmp_path / "o.jsonl").episodes.values()
-    assert episode.retained_mass_kg > 0.0
-
-
 def test_an_episode_that_never_loads_is_written_too(tmp_path):
     evaluate(tmp_path / "o.jsonl", settings=played(scenes=1, env={"episode_length": 1}))
     line = json.loads((tmp_path / "o.jsonl").read_text())

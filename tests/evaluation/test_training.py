@@ -8,33 +8,20 @@ from lerobot_excav.evaluation.training_log import read_training_log
 
 START = "INFO 2026-01-01 {} ot_train.py:597 Start offline training on a fixed dataset, with effective batch size: 16\n"
 SAVED = "Training:  72%|##| 9/9 [1:00<2:00]INFO 2026-01-01 {} ot_train.py:687 Checkpoint policy after step {}\n"
-FIRST = START.format("12:00:00") + SAVED.format("12:10:00", 900)
+BEGUN, AGAIN = START.format("12:00:00"), START.format("15:00:00")
+FIRST = BEGUN + SAVED.format("12:10:00", 900)
 LOST = FIRST + SAVED.format("12:20:00", 1800)
+LOGS = {
+    "nothing saved yet": (BEGUN, {}),
+    "from the first step": ("INFO 2026-01-01 11:00:00 x Creating dataset\n" + FIRST, {900: 10.0}),
+    "to each checkpoint": (FIRST + SAVED.format("12:20:30", 1800), {900: 10.0, 1800: 20.5}),
+    "continued": (FIRST + "\nKilled\n" + AGAIN + SAVED.format("15:05:00", 1800), {900: 10.0, 1800: 15.0}),
+    "what was lost costs no time": (LOST + AGAIN + SAVED.format("15:11:00", 1800), {900: 10.0, 1800: 21.0}),
+    "begun again from nothing": (LOST + AGAIN + SAVED.format("15:11:00", 900), {900: 11.0, 1800: 20.0}),
+}
 
 
-@pytest.mark.parametrize(
-    ("text", "minutes"),
-    [
-        pytest.param(START.format("12:00:00"), {}, id="nothing saved yet"),
-        pytest.param("INFO 2026-01-01 11:00:00 x Creating dataset\n" + FIRST, {900: 10.0}, id="from the first step"),
-        pytest.param(FIRST + SAVED.format("12:20:30", 1800), {900: 10.0, 1800: 20.5}, id="to each checkpoint"),
-        pytest.param(
-            FIRST + "\nKilled\n" + START.format("15:00:00") + SAVED.format("15:05:00", 1800),
-            {900: 10.0, 1800: 15.0},
-            id="continued from its last checkpoint",
-        ),
-        pytest.param(
-            LOST + START.format("15:00:00") + SAVED.format("15:11:00", 1800),
-            {900: 10.0, 1800: 21.0},
-            id="a checkpoint lost while it was saved costs no time",
-        ),
-        pytest.param(
-            LOST + START.format("15:00:00") + SAVED.format("15:11:00", 900),
-            {900: 11.0, 1800: 20.0},
-            id="begun again from nothing",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "minutes"), LOGS.values(), ids=LOGS)
 def test_minutes_count_what_led_to_a_checkpoint(tmp_path, text, minutes):
     (tmp_path / "t.log").write_text(text)
     assert read_training_log(tmp_path / "t.log").minutes == minutes

@@ -35,10 +35,8 @@ class Collapse(NamedTuple):
 
 def sand_with_friction(friction_deg: float) -> SoilParameters:
     """Return sand with another friction angle; soil on steel keeps two thirds of it."""
-    friction = math.radians(friction_deg)
-    return dataclasses.replace(
-        PRESETS["sand"], friction_angle_rad=friction, steel_friction_angle_rad=2.0 / 3.0 * friction
-    )
+    sand, friction = PRESETS["sand"], math.radians(friction_deg)
+    return dataclasses.replace(sand, friction_angle_rad=friction, steel_friction_angle_rad=2.0 / 3.0 * friction)
 
 
 def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: int) -> Collapse:

@@ -23,9 +23,8 @@ SCENES, QUICK_SCENES = 8, 2
 def run(conditions: Conditions) -> Result:
     """Let the scripted operator play validation scenes without pictures."""
     env = {"scene_set": "val", "soil": conditions.preset, "fidelity": conditions.fidelity, "episode_length": 200}
-    settings = DemonstrationSettings.of(
-        "excavator", env, scenes=QUICK_SCENES if conditions.quick else SCENES, targets=1
-    )
+    scenes = QUICK_SCENES if conditions.quick else SCENES
+    settings = DemonstrationSettings.of("excavator", env, scenes=scenes, targets=1)
     rows: list[tuple[float | str, ...]] = []
     for pair in track(settings.pairs(), "T8 cycles"):
         episode = play_demonstration(settings, pair, with_images=False)

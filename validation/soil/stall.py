@@ -131,6 +131,5 @@ def _plot(digs: dict[str, Dig]) -> Plot:
         seconds = TICK_S * np.arange(1, len(one.force_n) + 1)
         curves.append(Series(f"speed, {name} [m/s]", seconds, one.edge_speed_m_s, "line", color=k))
         curves.append(Series(f"force, {name} [10 kN]", seconds, one.force_n / 1e4, "dashed", color=k))
-    return Plot(
-        "stall", "Lower, drag, hold, drag on, lift", "time [s]", "speed of the edge [m/s]; force [10 kN]", tuple(curves)
-    )
+    title, y_label = "Lower, drag, hold, drag on, lift", "speed of the edge [m/s]; force [10 kN]"
+    return Plot("stall", title, "time [s]", y_label, tuple(curves))

@@ -92,11 +92,8 @@ def test_context_is_made_with_the_first_picture_and_freed_by_close(pictures):
             take("above", EVERYTHING)
 
 
-def test_unknown_camera_is_refused(pictures):
+def test_an_unknown_camera_and_a_picture_without_pixels_are_refused(pictures):
     with pytest.raises(ConfigurationError, match=r"camera='below'.*'above', 'aside'"):
         pictures.colour("below", EVERYTHING)
-
-
-def test_a_picture_without_pixels_is_refused():
     with pytest.raises(ConfigurationError, match="height=0"):
         CameraPictures(MODEL, mujoco.MjData(MODEL), cameras=("above",), height=0, width=8, max_geoms=10)

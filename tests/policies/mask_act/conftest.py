@@ -47,9 +47,7 @@ def stem(network):
 
 def make_batch(batch_size=3, *, seed=0, actions=False):
     generator = torch.Generator().manual_seed(seed)
-    batch = {
-        key: torch.rand(batch_size, *feature.shape, generator=generator) for key, feature in INPUT_FEATURES.items()
-    }
+    batch = {key: torch.rand(batch_size, *ft.shape, generator=generator) for key, ft in INPUT_FEATURES.items()}
     batch[MASK] = square_mask(batch_size, top=8, left=16)
     if actions:
         batch["action"] = torch.randn(batch_size, CHUNK, 4, generator=generator)
@@ -63,14 +61,10 @@ def square_mask(batch_size, *, top, left, size=12):
     return mask
 
 
-@pytest.fixture
-def config():
-    return make_config
-
-
-@pytest.fixture
-def policy():
-    return make_policy
+config = pytest.fixture(lambda: make_config)
+policy = pytest.fixture(lambda: make_policy)
+batch = pytest.fixture(lambda: make_batch)
+mask = pytest.fixture(lambda: square_mask)
 
 
 @pytest.fixture
@@ -85,13 +79,3 @@ def awake():
         return agent
 
     return build
-
-
-@pytest.fixture
-def batch():
-    return make_batch
-
-
-@pytest.fixture
-def mask():
-    return square_mask

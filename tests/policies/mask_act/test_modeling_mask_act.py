@@ -70,9 +70,7 @@ def test_training_cuts_masks_of_lossy_videos_at_one_half(policy, batch):
 
 
 @pytest.mark.parametrize(("use_vae", "weight"), [(False, 10.0), (True, 0.0), (True, 10.0)])
-def test_the_loss_is_the_error_and_the_weighted_divergence_and_the_mean_of_those_per_sample(
-    policy, batch, use_vae, weight
-):
+def test_the_loss_is_error_and_weighted_divergence_and_the_mean_over_samples(policy, batch, use_vae, weight):
     agent, data = policy(use_vae=use_vae, kl_weight=weight).train(), batch(actions=True)
     torch.manual_seed(1)
     mean, _ = agent.forward(data)

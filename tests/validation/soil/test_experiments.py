@@ -12,8 +12,7 @@ CHEAP = ("T5", "T6", "T11", "T12", "T13", "T16")
 
 
 @pytest.mark.parametrize(
-    "experiment",
-    [pytest.param(e, id=e.code, marks=() if e.code in CHEAP else pytest.mark.slow) for e in EXPERIMENTS],
+    "experiment", [pytest.param(e, id=e.code, marks=() if e.code in CHEAP else pytest.mark.slow) for e in EXPERIMENTS]
 )
 def test_an_experiment_is_inside_its_gates_or_says_why_not(experiment):
     # One arrangement of each column of T1 scatters too much for a fit through two of them.

@@ -13,6 +13,14 @@ from lerobot_excav.envs.soil import Soil
 PARCEL_RADIUS_M = 0.045
 
 
+def skin_mesh(model, name):
+    """The vertices (n, 3) of a skin, and its faces (m, 3) as numbers of vertices."""
+    skin = model.skin(name).id
+    first, start = model.skin_faceadr[skin], model.skin_vertadr[skin]
+    faces = model.skin_face[first : first + model.skin_facenum[skin]]
+    return model.skin_vert[start : start + model.skin_vertnum[skin]], faces
+
+
 @pytest.fixture(scope="session")
 def compiled():
     """The model as built, which nobody may change."""
@@ -45,7 +53,4 @@ class SoilWithParcels(Soil):
     parcel_is_load = property(lambda self: self._is_load)
 
 
-@pytest.fixture
-def soil_with_parcels():
-    """Make a `SoilWithParcels`."""
-    return SoilWithParcels
+soil_with_parcels = pytest.fixture(lambda: SoilWithParcels)

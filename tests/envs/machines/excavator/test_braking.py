@@ -83,9 +83,7 @@ def test_rows_give_the_speed_of_a_rigid_body(seed):
         pytest.param(1e6, 0.4, (-0.5, 0.1), (25.0, -5.0, 0.0), [0, 1], id="friction holds what it can hold"),
     ],
 )
-def test_a_patch_pushes_and_rubs_as_far_as_it_can_and_no_more_than_stops_the_motion(
-    limit, friction, free, impulse, held
-):
+def test_a_patch_pushes_and_rubs_as_it_can_but_only_stops_the_motion(limit, friction, free, impulse, held):
     rows, *limits = one_patch(limit, friction)
     total, impulses = braking_impulse(rows, *limits, np.array(free))
     np.testing.assert_allclose(impulses[0], impulse, rtol=1e-3 if held else 1e-6)

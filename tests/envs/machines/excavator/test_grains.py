@@ -5,6 +5,8 @@ from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_S
 from lerobot_excav.envs.machines.excavator.grains import MOST_PARCELS, PARCELS_PER_SKIN, Grains
 from lerobot_excav.envs.soil import FIDELITIES
 
+from .conftest import skin_mesh
+
 
 def shown_vertices(model):
     skins = [i for i in range(model.nskin) if model.skin(i).name.startswith("grains")]
@@ -47,11 +49,8 @@ def test_the_finest_soil_has_no_more_parcels_than_are_drawn():
 
 
 def test_faces_look_outwards(model):
-    index = model.skin("grains_0").id
     Grains(model).show(np.zeros((PARCELS_PER_SKIN, 3)), np.ones(PARCELS_PER_SKIN))
-    first, start = model.skin_faceadr[index], model.skin_vertadr[index]
-    faces = model.skin_face[first : first + model.skin_facenum[index]]
-    vertices = model.skin_vert[start : start + model.skin_vertnum[index]]
+    vertices, faces = skin_mesh(model, "grains_0")
     middle = vertices.reshape(-1, 4, 3).mean(axis=1).repeat(4, axis=0)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     assert ((np.cross(b - a, c - a) * (a - middle)).sum(axis=1) > 0.0).all()

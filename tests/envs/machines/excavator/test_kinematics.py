@@ -25,8 +25,7 @@ def test_forward_agrees_with_mujoco(compiled, joint_pos):
 @given(joint_pos=joint_positions, turns=st.integers(-2, 2))
 def test_inverse_undoes_forward_with_any_number_of_turns_of_the_pitch(joint_pos, turns):
     edge_w, pitch = forward(joint_pos)
-    swing = joint_pos[0]
-    offset = edge_w - const.MACHINE_POS_W
+    swing, offset = joint_pos[0], edge_w - const.MACHINE_POS_W
     radius = offset[0] * np.cos(swing) + offset[1] * np.sin(swing)
     found = inverse(radius, edge_w[2], pitch + turns * 2 * np.pi, swing)
     assert found is not None
@@ -39,8 +38,7 @@ def test_inverse_returns_a_pose_that_reaches_or_none(radius, height, pitch, swin
     if found is None:
         return
     lower, upper = np.array(const.JOINT_RANGE_RAD).T
-    assert (found >= lower - 1e-6).all()
-    assert (found <= upper + 1e-6).all()
+    assert ((lower - 1e-6 <= found) & (found <= upper + 1e-6)).all()
     edge_w, found_pitch = forward(found)
     expected = np.array([radius * np.cos(swing), radius * np.sin(swing), height]) + const.MACHINE_POS_W
     np.testing.assert_allclose(edge_w, expected, atol=1e-6)

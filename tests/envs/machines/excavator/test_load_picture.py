@@ -5,14 +5,14 @@ from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_S
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.load_picture import LOAD_SKIN, LoadPicture, load_grid
 
-RADIUS_M = 0.045
+from .conftest import PARCEL_RADIUS_M as RADIUS_M
+from .conftest import skin_mesh
 
 
 def surface(model):
     """The z_t of the skin at the vertices of its grid."""
     shape = load_grid().shape[:2]
-    start = model.skin_vertadr[model.skin(LOAD_SKIN).id]
-    return model.skin_vert[start : start + shape[0] * shape[1], 2].reshape(shape)
+    return skin_mesh(model, LOAD_SKIN)[0][: shape[0] * shape[1], 2].reshape(shape)
 
 
 def layer(z_t):
@@ -28,8 +28,7 @@ def test_the_skin_lies_on_the_parcels(model, z_t):
     grid = load_grid()
     middle = (np.abs(grid[..., 1]) < 0.25) & (grid[..., 0] > 0.45) & (grid[..., 0] < 0.85)
     depth = surface(model)[middle]
-    assert depth.min() > z_t - RADIUS_M
-    assert depth.max() < z_t + 0.5 * RADIUS_M
+    assert z_t - RADIUS_M < depth.min() <= depth.max() < z_t + 0.5 * RADIUS_M
 
 
 def test_no_skin_without_a_load(model):
@@ -58,9 +57,7 @@ def test_a_parcel_that_stands_out_is_seen_and_those_below_the_skin_are_not(model
 
 def test_the_skin_faces_out_of_the_opening(model):
     LoadPicture(model).show(*layer(0.1))
-    index = model.skin(LOAD_SKIN).id
-    first, start = model.skin_faceadr[index], model.skin_vertadr[index]
-    vertices = model.skin_vert[start : start + model.skin_vertnum[index]]
-    sheet = model.skin_face[first : first + 2 * np.prod(np.subtract(load_grid().shape[:2], 1))]
+    vertices, faces = skin_mesh(model, LOAD_SKIN)
+    sheet = faces[: 2 * np.prod(np.subtract(load_grid().shape[:2], 1))]
     a, b, c = (vertices[sheet[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] < 0.0).all()

@@ -2,9 +2,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator import cameras
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.bodywork import SURROUNDINGS_BIT, WORKING_BIT
+from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.soil import Container
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
@@ -76,9 +76,7 @@ def test_bucket_plates_lie_outside_the_inner_profile(model):
         assert offset @ (middle - np.array([0.6, 0.2])) > 0  # away from a point inside
 
 
-@pytest.mark.parametrize(
-    ("name", "pose"), [("main", cameras.MAIN), ("overview", cameras.OVERVIEW), ("cab", cameras.CAB)]
-)
+@pytest.mark.parametrize(("name", "pose"), [("main", MAIN), ("overview", OVERVIEW), ("cab", CAB)])
 def test_cameras_stand_and_look_as_their_poses_say(model, data, name, pose):
     camera = model.camera(name)
     origin = data.body("house").xpos if name == "cab" else np.zeros(3)

@@ -7,7 +7,8 @@ from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture, _resampled
 from lerobot_excav.envs.soil import Soil
 
-RADIUS_M = 0.045
+from .conftest import PARCEL_RADIUS_M as RADIUS_M
+from .conftest import skin_mesh
 
 
 @pytest.fixture
@@ -16,9 +17,7 @@ def picture(machine):
 
 
 def skin(machine, name):
-    index = machine.model.skin(name).id
-    start = machine.model.skin_vertadr[index]
-    return machine.model.skin_vert[start : start + machine.model.skin_vertnum[index]]
+    return skin_mesh(machine.model, name)[0]
 
 
 def drawn(machine, name):

@@ -3,6 +3,8 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator import surfaces
 
+from .conftest import skin_mesh
+
 
 def test_vertices_are_the_surface_and_a_skirt_below_its_border():
     grid = surfaces._grid((0.4, 0.3))
@@ -18,11 +20,7 @@ def test_vertices_are_the_surface_and_a_skirt_below_its_border():
 
 @pytest.mark.parametrize("name", [surfaces.TERRAIN_SKIN, surfaces.BOX_SOIL_SKIN])
 def test_skin_is_a_closed_sheet_that_faces_outwards(model, name):
-    skin = model.skin(name).id
-    count, start = model.skin_vertnum[skin], model.skin_vertadr[skin]
-    vertices = model.skin_vert[start : start + count]
-    first = model.skin_faceadr[skin]
-    faces = model.skin_face[first : first + model.skin_facenum[skin]]
+    vertices, faces = skin_mesh(model, name)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     flat = np.isclose(a[:, 2], b[:, 2]) & np.isclose(a[:, 2], c[:, 2])

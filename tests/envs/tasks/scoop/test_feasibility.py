@@ -24,8 +24,7 @@ def test_regions_lie_within_reach_and_on_the_surface():
     centers_w = centers_on(plateau(0.6))
     radius = np.hypot(*(centers_w[:, :2] - MACHINE_POS_W[:2]).T)
     assert len(centers_w) > 100
-    assert radius.min() >= RADIUS_RANGE_M[0]
-    assert radius.max() <= RADIUS_RANGE_M[1]
+    assert RADIUS_RANGE_M[0] <= radius.min() <= radius.max() <= RADIUS_RANGE_M[1]
     assert (centers_w[:, 2] == 0.6).all()
 
 

@@ -32,7 +32,7 @@ def hidden_finely(heights_m, eye_w, *, points=4000):
     return hidden
 
 
-def test_level_ground_fills_what_its_corners_enclose():
+def test_level_ground_fills_what_its_corners_enclose_in_pixels_of_any_size():
     heights_m = np.full((60, 60), 0.4)
     corners_w = np.array([(x, y, 0.4) for x, y in ((-1.5, -1.5), (1.5, -1.5), (1.5, 1.5), (-1.5, 1.5))])
     local = (corners_w - MAIN.position) @ MAIN.axes
@@ -40,10 +40,6 @@ def test_level_ground_fills_what_its_corners_enclose():
     column, row = (focal_px * local[:, :2] / local[:, 2:]).T
     enclosed_px = 0.5 * abs(np.dot(column, np.roll(row, 1)) - np.dot(row, np.roll(column, 1)))
     assert seen_px(heights_m).sum() == pytest.approx(enclosed_px, rel=0.01)
-
-
-def test_twice_as_high_a_picture_has_four_times_the_area():
-    heights_m = np.zeros((60, 60))
     large = seen_area_px(heights_m, AXIS_W, AXIS_W, MAIN, picture_height_px=2 * PICTURE_PX)
     np.testing.assert_allclose(large, 4.0 * seen_px(heights_m))
 
