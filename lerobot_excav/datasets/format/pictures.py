@@ -30,13 +30,9 @@ class Pictures(Protocol):
 
 @dataclass(frozen=True)
 class StoredImages:
-    """Pictures as files within a column of the table.
+    """Pictures as files within a column of the table."""
 
-    Attributes:
-        column: One record per frame, with the file's `bytes`.
-    """
-
-    column: pa.ChunkedArray
+    column: pa.ChunkedArray  # one record per frame, with the file's `bytes`
 
     def frame(self, number: int) -> NDArray[Any]:
         """Return a picture, (H, W, 3) uint8."""
@@ -53,19 +49,12 @@ class StoredImages:
 
 @dataclass(frozen=True, kw_only=True)
 class VideoSpan:
-    """Pictures as a part of a video file, which several episodes may share.
+    """Pictures as a part of a video file, which several episodes may share."""
 
-    Attributes:
-        path: The file.
-        start_s: Time of the first picture in the file [s].
-        fps: Pictures per second.
-        length: Number of pictures.
-    """
-
-    path: Path
-    start_s: float
-    fps: int
-    length: int
+    path: Path  # the file
+    start_s: float  # time of the first picture in the file [s]
+    fps: int  # pictures per second
+    length: int  # number of pictures
 
     def frame(self, number: int) -> NDArray[Any]:
         """Return a picture, (H, W, 3) uint8."""

@@ -16,17 +16,11 @@ Schedule = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """What an episode plays.
+    """What an episode plays."""
 
-    Attributes:
-        scene_id: Scene.
-        target_id: Target that is commanded at the start.
-        schedule: Changes of the command; None leaves them to the task.
-    """
-
-    scene_id: int
-    target_id: int
-    schedule: Schedule | None = None
+    scene_id: int  # scene
+    target_id: int  # target that is commanded at the start
+    schedule: Schedule | None = None  # changes of the command; None leaves them to the task
 
 
 def select_episode(

@@ -14,19 +14,12 @@ COMMANDED, OTHER, NONE = GRASPED = ("commanded", "other", "none")
 
 
 class GraspRecord(EpisodeRecord):
-    """Outcome of one grasping episode; where the command changed, the last one counts.
+    """Outcome of one grasping episode; where the command changed, the last one counts."""
 
-    Attributes:
-        episode_return: Sum of the rewards.
-        first_grasped_block: First block that the fingers lifted since the last command; -1 if they lifted none.
-        target_in_tray: Whether the commanded block rests in the tray.
-        blocks_in_tray: How many blocks do.
-    """
-
-    episode_return: float
-    first_grasped_block: int
-    target_in_tray: bool
-    blocks_in_tray: int
+    episode_return: float  # sum of the rewards
+    first_grasped_block: int  # first block that the fingers lifted since the last command; -1 if they lifted none
+    target_in_tray: bool  # whether the commanded block rests in the tray
+    blocks_in_tray: int  # how many blocks do
 
     @property
     def grasped(self) -> str:

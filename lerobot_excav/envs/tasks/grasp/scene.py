@@ -32,15 +32,10 @@ BLOCK_COLOURS = (
 
 @dataclass(frozen=True, kw_only=True)
 class GraspScene(WorkcellStart):
-    """One starting situation of the work cell; the block with index i is target i.
+    """One starting situation of the work cell; the block with index i is target i."""
 
-    Attributes:
-        scene_set: `train`, `val` or `test`; their random streams are disjoint.
-        scene_id: Number within the set.
-    """
-
-    scene_set: str
-    scene_id: int
+    scene_set: str  # `train`, `val` or `test`; their random streams are disjoint
+    scene_id: int  # number within the set
 
 
 @lru_cache(maxsize=8)

@@ -11,25 +11,15 @@ if TYPE_CHECKING:
 
 
 class ScoopRecord(EpisodeRecord):
-    """Outcome of one dig-load-dump cycle.
+    """Outcome of one dig-load-dump cycle."""
 
-    Attributes:
-        soil: Soil preset.
-        fidelity: Numerical effort of the soil.
-        target_success: Whether loading began inside the commanded patch.
-        retained_mass_kg: Soil brought into the box [kg].
-        residual_bucket_mass_kg: Soil left in the bucket [kg].
-        hard_target_contacts: Hard contacts with the box.
-        spill_before_target_events: Losses of soil on the way.
-    """
-
-    soil: str
-    fidelity: str
-    target_success: bool
-    retained_mass_kg: float
-    residual_bucket_mass_kg: float
-    hard_target_contacts: int
-    spill_before_target_events: int
+    soil: str  # soil preset
+    fidelity: str  # numerical effort of the soil
+    target_success: bool  # whether loading began inside the commanded patch
+    retained_mass_kg: float  # soil brought into the box [kg]
+    residual_bucket_mass_kg: float  # soil left in the bucket [kg]
+    hard_target_contacts: int  # hard contacts with the box
+    spill_before_target_events: int  # losses of soil on the way
 
     @property
     def has_hard_contact(self) -> bool:

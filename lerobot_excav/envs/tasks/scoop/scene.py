@@ -23,19 +23,12 @@ _PILE_TRIES = 50
 
 @dataclass(frozen=True, kw_only=True)
 class Scene(WorksiteStart):
-    """One starting situation of the worksite, with what can be commanded in it.
+    """One starting situation of the worksite, with what can be commanded in it."""
 
-    Attributes:
-        scene_set: `train`, `val` or `test`; their random streams are disjoint.
-        scene_id: Number within the set.
-        soil: Name of the soil preset, or parameters of one's own.
-        targets: The feasible dig regions, indexed by `target_id`.
-    """
-
-    scene_set: str
-    scene_id: int
-    soil: str | SoilParameters
-    targets: tuple[Target, ...]
+    scene_set: str  # `train`, `val` or `test`; their random streams are disjoint
+    scene_id: int  # number within the set
+    soil: str | SoilParameters  # name of the soil preset, or parameters of one's own
+    targets: tuple[Target, ...]  # the feasible dig regions, indexed by `target_id`
 
 
 def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

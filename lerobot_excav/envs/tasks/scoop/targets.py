@@ -22,17 +22,11 @@ class TooFewTargetsError(ExcavError):
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A square patch of the ground plane, turned towards the machine.
+    """A square patch of the ground plane, turned towards the machine."""
 
-    Attributes:
-        center_w: Centre on the soil surface [m], shape (3,), world frame.
-        yaw_rad: Direction from the machine to the patch [rad].
-        size_m: Edge length [m].
-    """
-
-    center_w: NDArray[np.float64]
-    yaw_rad: float
-    size_m: float = PATCH_SIZE_M
+    center_w: NDArray[np.float64]  # centre on the soil surface [m], shape (3,), world frame
+    yaw_rad: float  # direction from the machine to the patch [rad]
+    size_m: float = PATCH_SIZE_M  # edge length [m]
 
     def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points (..., 2) or (..., 3) [m], world frame, lie above, on or below the patch; NaN is outside."""

@@ -44,17 +44,11 @@ class WayPoint(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a plan asks for at a moment.
+    """What a plan asks for at a moment."""
 
-    Attributes:
-        grasp_pos_w: Position of the grasp point [m], (3,), world frame.
-        upright: How far the tool has turned from its direction at the start to straight down, 0 to 1.
-        opening: Target of the gripper [0..1].
-    """
-
-    grasp_pos_w: NDArray[np.float64]
-    upright: float
-    opening: float
+    grasp_pos_w: NDArray[np.float64]  # position of the grasp point [m], (3,), world frame
+    upright: float  # how far the tool has turned from its direction at the start to straight down, 0 to 1
+    opening: float  # target of the gripper [0..1]
 
 
 class Plan:

@@ -15,23 +15,14 @@ PACE_RANGE = (0.9, 1.1)
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """Style of one grasp.
+    """Style of one grasp."""
 
-    Attributes:
-        approach_offset_m: Of the point above the block in the plane [m], (2,).
-        approach_raise_m: Of its height [m].
-        grip_offset_m: Of the grip in the plane [m], (2,).
-        lift_raise_m: Of the height after lifting [m].
-        release_offset_m: Of the place in the tray [m], (2,).
-        pace: Factor on the duration of each phase, (phases,).
-    """
-
-    approach_offset_m: NDArray[np.float64]
-    approach_raise_m: float
-    grip_offset_m: NDArray[np.float64]
-    lift_raise_m: float
-    release_offset_m: NDArray[np.float64]
-    pace: NDArray[np.float64]
+    approach_offset_m: NDArray[np.float64]  # of the point above the block in the plane [m], (2,)
+    approach_raise_m: float  # of its height [m]
+    grip_offset_m: NDArray[np.float64]  # of the grip in the plane [m], (2,)
+    lift_raise_m: float  # of the height after lifting [m]
+    release_offset_m: NDArray[np.float64]  # of the place in the tray [m], (2,)
+    pace: NDArray[np.float64]  # factor on the duration of each phase, (phases,)
 
 
 def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:

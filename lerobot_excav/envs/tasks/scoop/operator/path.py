@@ -19,19 +19,12 @@ class UnreachableError(ExcavError):
 
 @dataclass(frozen=True, kw_only=True)
 class BucketPose:
-    """Pose of the bucket in the machine's cylinder coordinates.
+    """Pose of the bucket in the machine's cylinder coordinates."""
 
-    Attributes:
-        radius_m: Cutting edge, from the swing axis.
-        height_m: Cutting edge, above the floor.
-        pitch_rad: Chord from pin to edge against the horizontal, upwards positive.
-        swing_rad: Swing angle.
-    """
-
-    radius_m: float
-    height_m: float
-    pitch_rad: float
-    swing_rad: float
+    radius_m: float  # cutting edge, from the swing axis
+    height_m: float  # cutting edge, above the floor
+    pitch_rad: float  # chord from pin to edge against the horizontal, upwards positive
+    swing_rad: float  # swing angle
 
     @classmethod
     def of_pin(cls, *, radius_m: float, height_m: float, pitch_rad: float, swing_rad: float) -> "BucketPose":

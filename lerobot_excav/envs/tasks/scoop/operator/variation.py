@@ -10,33 +10,19 @@ TREMOR_TIME_S = 0.4  # how long the noise of a hand remembers itself (kind: gues
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """Style of one cycle; every range below is a guess at how practised people differ.
+    """Style of one cycle; every range below is a guess at how practised people differ."""
 
-    Attributes:
-        speed: Fraction of the machine's speed that is used.
-        entry_along_m: Where the edge enters the soil, along the boom from the centre of the patch [m].
-        entry_across_m: The same across the boom [m].
-        depth_m: Depth of cut [m].
-        attack_pitch_rad: Preferred pitch of the bucket chord at entry [rad].
-        cut_volume_m3: Soil to sweep before the bucket is rolled in [m3].
-        roll_in_pitch_rad: Pitch at the end of the cut [rad]; the curl goes on from there.
-        carry_height_m: Height of the bucket pin above the box [m].
-        dump_along_m: Where the load is dropped, along the boom from the centre of the box [m].
-        pauses_s: Rest before each phase [s], shape (phases,).
-        tremor: Size of the slow noise on the commands, as a fraction of full stick.
-    """
-
-    speed: float
-    entry_along_m: float
-    entry_across_m: float
-    depth_m: float
-    attack_pitch_rad: float
-    cut_volume_m3: float
-    roll_in_pitch_rad: float
-    carry_height_m: float
-    dump_along_m: float
-    pauses_s: tuple[float, ...]
-    tremor: float
+    speed: float  # fraction of the machine's speed that is used
+    entry_along_m: float  # where the edge enters the soil, along the boom from the centre of the patch [m]
+    entry_across_m: float  # the same across the boom [m]
+    depth_m: float  # depth of cut [m]
+    attack_pitch_rad: float  # preferred pitch of the bucket chord at entry [rad]
+    cut_volume_m3: float  # soil to sweep before the bucket is rolled in [m3]
+    roll_in_pitch_rad: float  # pitch at the end of the cut [rad]; the curl goes on from there
+    carry_height_m: float  # height of the bucket pin above the box [m]
+    dump_along_m: float  # where the load is dropped, along the boom from the centre of the box [m]
+    pauses_s: tuple[float, ...]  # rest before each phase [s], shape (phases,)
+    tremor: float  # size of the slow noise on the commands, as a fraction of full stick
 
 
 def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
