@@ -6,7 +6,7 @@ from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.main import main
 from lerobot_excav.scripts.report import runs_from
 
-from ..evaluation.conftest import grasp
+from ..evaluation.conftest import GRASP, line
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def metrics(tmp_path):
     def write(name, *returns):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
-        lines = [grasp(number, episode_return=value) for number, value in enumerate(returns)]
+        lines = [line(GRASP, number, episode_return=value) for number, value in enumerate(returns)]
         path.write_text("".join(json.dumps(line) + "\n" for line in lines))
         return path
 
