@@ -7,6 +7,7 @@ import pytest
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.session_log import SessionLog, default_path
 
 
@@ -30,3 +31,7 @@ def test_a_command_after_the_last_action_is_not_logged(tmp_path):
         log.count_frame(target_id)
     log.write()
     assert json.loads(log.path.read_text())["commands"] == [[0, 0], [2, 2]]
+
+
+def test_an_arm_whose_episodes_others_end_may_change_its_command_late():
+    assert FR5SimConfig(id="arm", retarget_frame=500).retarget_frame == 500

@@ -105,6 +105,12 @@ def test_an_environment_is_chosen_with_its_own_settings():
         parse("--env.type=lathe", kind=kind)
 
 
+@pytest.mark.parametrize("option", ["mask_condition=zero", "target_overlay=true", "observation_height=32"])
+def test_the_operator_takes_no_option_about_pictures(option):
+    with pytest.raises(ConfigurationError, match=rf"--env\.{option.split('=')[0]}=\S+ has no effect"):
+        parse(f"--env.{option}", kind=COMMAND_ARGUMENTS["operator"], command="operator")
+
+
 BAD_TEXTS = r"0 -1 nan inf 1e400 null true typo [ [1,a] {} *x 2026-01-01 2026-13-45 @ !!python/object:x a:b \ ' --"
 bad_texts = st.sampled_from([*BAD_TEXTS.split(), "", "a: b", "\x00", "9" * 30, "9" * 5000]) | st.text(max_size=6)
 
