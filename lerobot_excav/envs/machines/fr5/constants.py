@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2 as GRAVITY_M_S2
-from lerobot_excav.envs.constants import TICK_S
+from lerobot_excav.envs.constants import TICK_S as TICK_S
 
-CONTROL_TICK_S = TICK_S
 SUBSTEP_S = 0.002
 """MuJoCo's time step [s]; the contacts of a gripped block need it (kind: tuned)."""
 

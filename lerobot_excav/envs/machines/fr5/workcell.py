@@ -15,7 +15,7 @@ from lerobot_excav.envs.machines.fr5.mjcf import build_model
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
 ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper target [0..1]
-_SUBSTEPS = round(const.CONTROL_TICK_S / const.SUBSTEP_S)
+_SUBSTEPS = round(const.TICK_S / const.SUBSTEP_S)
 _SETTLE_TICKS = 10  # 0.2 s, for blocks to find their contact with the table
 
 _CTRL_SCALE = np.append(np.ones(6), const.FINGER_STROKE_M)  # from an action to what the servos are given [rad, m]

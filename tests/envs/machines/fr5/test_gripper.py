@@ -28,7 +28,7 @@ def test_gripper_starts_open_and_reaches_what_is_asked_for_with_mirrored_fingers
 
 
 def test_fingers_keep_their_speed_limit(run):
-    speed = np.abs(np.diff(run(0.0, 20))) * const.FINGER_STROKE_M / const.CONTROL_TICK_S
+    speed = np.abs(np.diff(run(0.0, 20))) * const.FINGER_STROKE_M / const.TICK_S
     assert 0.5 * const.FINGER_SPEED_M_S < speed.max() <= 1.05 * const.FINGER_SPEED_M_S
 
 
