@@ -28,6 +28,16 @@ class RenderingError(ExcavError, RuntimeError):
     """Pictures cannot be made on this machine."""
 
 
+def shown(value: Any, *, most: int = 200) -> str:
+    """Return a value as messages show it: on one line, cut where it is long, whatever it is."""
+    try:
+        text = repr(value)
+    except Exception:  # a whole number of thousands of digits, or a class of somebody else
+        return f"<{type(value).__name__}>"
+    text = " ".join(text.split())
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
 def require_choice(field: str, value: Any, allowed: Collection[Any], *, hint: str = "") -> None:
     """Raise unless a value is one of the allowed ones.
 
@@ -42,7 +52,7 @@ def require_choice(field: str, value: Any, allowed: Collection[Any], *, hint: st
     """
     if value not in allowed:
         names = ", ".join(repr(a) for a in allowed)
-        raise ConfigurationError(f"{field}={value!r} is not known; allowed: {names}. {hint}".rstrip())
+        raise ConfigurationError(f"{field}={shown(value)} is not known; allowed: {names}. {hint}".rstrip())
 
 
 def require(condition: bool, message: str) -> None:  # noqa: FBT001 - reads as an assertion
@@ -68,5 +78,5 @@ def require_integer(field: str, value: Any, low: int, high: int | None = None, *
     limits = f"from {low} on" if high is None else f"from {low} to {high}"
     require(
         is_integer and value >= low and (high is None or value <= high),
-        f"{field}={value!r} is not possible; give a whole number {limits}. {hint}".rstrip(),
+        f"{field}={shown(value)} is not possible; give a whole number {limits}. {hint}".rstrip(),
     )

@@ -1,6 +1,9 @@
 """Command lines made of dataclasses, in LeRobot's own words, by the parser that LeRobot uses."""
 
 import argparse
+import functools
+import itertools
+import json
 import typing
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +17,7 @@ from draccus.help_formatter import SimpleHelpFormatter
 from draccus.wrappers.docstring import HelpOrder
 
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.envs.tasks.setting import check_settings, with_default
+from lerobot_excav.setting import check_settings, with_default
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 
@@ -116,10 +119,12 @@ def parse_arguments[Parsed: Arguments](
         exit_on_error=False,
     )
     help_hint = f"`lerobot-excav {command} --help` lists the options"
+    options = _with_texts_quoted(kind, options)
     for word in options:
         _require_readable(word, help_hint)
     try:
         parsed: Parsed = parser.parse_args(options)
+        _require_no_truth_for_numbers(parsed, options)
     except (draccus.utils.DraccusException, argparse.ArgumentError) as error:
         # A setting of the environment that is not possible says so itself.
         if isinstance(error.__cause__, ConfigurationError):
@@ -132,12 +137,50 @@ def parse_arguments[Parsed: Arguments](
 
 def _require_readable(word: str, hint: str) -> None:
     """Raise unless the value of an option is YAML, which draccus takes it for; argparse loses the value `--`."""
-    name, _, text = word.partition("=") if word.startswith("-") else ("", "", word)
+    name, equals, text = word.partition("=") if word.startswith("-") else ("", "", word)
+    require(bool(text) or not equals, f"{word} has no value after it; leave it out; {hint}")
+    # draccus would read the rest of such a word as the name of a file with settings.
+    plain = text.strip("'\"")
+    require(not plain.startswith("include"), f"{name}={plain} is not possible: write ./{plain} for a file of this name")
     try:
         parse_string("[" if text == "--" else text)
     except Exception as error:  # whatever YAML takes offence at
         problem = " ".join(str(error).split())
         raise ConfigurationError(f"{name}={text!r} cannot be read ({problem}); {hint}") from None
+
+
+def _with_texts_quoted(kind: type[Arguments], options: Sequence[str]) -> list[str]:
+    """Return the options with texts and paths in quotes: YAML makes 7 of `007`, and 1000.0 of `1e3`."""
+    types = typing.get_type_hints(kind)
+    words = list(options)
+    for number, word in enumerate(options):
+        name, equals, text = word.partition("=")
+        taken_as = types.get(name.removeprefix("--"))
+        if not {str, Path} & {taken_as, *typing.get_args(taken_as)} or typing.get_origin(taken_as) is list:
+            continue
+        if equals:
+            words[number] = f"{name}={_quoted(text)}"
+        elif not "".join(options[number + 1 : number + 2]).startswith("--"):
+            words[number + 1 : number + 2] = map(_quoted, options[number + 1 : number + 2])
+    return words
+
+
+def _quoted(text: str) -> str:
+    is_as_it_is = text in ("", "null") or text[0] in "'\""
+    return text if is_as_it_is else json.dumps(text, ensure_ascii=False)
+
+
+def _require_no_truth_for_numbers(parsed: Arguments, options: Sequence[str]) -> None:
+    """Raise where `true` was given for a number: draccus makes 1 of it."""
+    for word, following in itertools.pairwise([*options, ""]):
+        name, equals, text = word.partition("=")
+        text = text if equals else following
+        field = functools.reduce(lambda part, each: getattr(part, each, None), name.strip("-").split("."), parsed)
+        is_number = isinstance(field, int | float) and not isinstance(field, bool)
+        require(
+            not (is_number and name.startswith("--") and isinstance(parse_string(text), bool)),
+            f"{name}={text} is not possible; true and false are no numbers",
+        )
 
 
 def _set_first(parsed: Arguments, words: list[str], command: str) -> None:

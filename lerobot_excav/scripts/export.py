@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.setting import setting
 from lerobot_excav.scripts.arguments import Arguments
 
 

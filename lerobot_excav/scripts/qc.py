@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.setting import setting
 from lerobot_excav.scripts.arguments import Arguments
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-from lerobot_excav.envs.tasks.setting import setting
+from lerobot_excav.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
-from lerobot_excav.envs.tasks.setting import check_settings, setting
+from lerobot_excav.setting import check_settings, setting
 
 
 @dataclass(kw_only=True)

@@ -7,7 +7,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.robots import RobotConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers every type
-from lerobot_excav.envs.tasks.setting import declared_settings
+from lerobot_excav.setting import declared_settings
 
 CONFIGS = {
     f"--{kind}.type={name}": config

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.envs.tasks.setting import declared_settings, setting
+from lerobot_excav.setting import declared_settings, setting
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments, parse_arguments
 from lerobot_excav.scripts.main import COMMANDS, main
@@ -24,6 +24,7 @@ class Lunch(Arguments):
     POSITIONAL: ClassVar[str] = "table"
 
     table: Path | None = setting("Where", default=None)
+    guest: str = setting("Who comes", default="anybody")
     dish: str = setting("What", default="soup", choices=("soup", "rice"))
     plates: int = setting("How many, 100 % of them clean", default=1, low=1, high=9)
     hot: bool = setting("Whether it is hot", default=False)
@@ -42,6 +43,11 @@ def parse(*argv, kind=Lunch, command="lunch"):
         (["--plates", "3", "--hot"], Lunch(plates=3, hot=True)),
         (["--hot", "--plates=3"], Lunch(plates=3, hot=True)),
         (["--hot=false"], Lunch()),
+        (["--table=007"], Lunch(table=Path("007"))),
+        (["--table=1e3", "--guest", "true"], Lunch(table=Path("1e3"), guest="true")),
+        (["--guest=2026-01-01"], Lunch(guest="2026-01-01")),
+        (["--guest='a'"], Lunch(guest="a")),
+        (["--guest=a: [b", "--table", "@c"], Lunch(guest="a: [b", table=Path("@c"))),
     ],
 )
 def test_words_become_arguments(argv, expected):
@@ -54,12 +60,18 @@ def test_words_become_arguments(argv, expected):
         (["--dessert=3"], r"unrecognized arguments: --dessert=3; `lerobot-excav lunch --help` lists the options"),
         (["--plate=3"], "unrecognized arguments: --plate=3"),  # no guessing of shortened names
         (["--plates"], "--plates: expected one argument"),
-        (["--plates="], "plates.*Couldn't parse ''"),
+        (["--plates="], "--plates= has no value after it"),
+        (["--table="], "--table= has no value after it"),
+        (["--plates=true"], "--plates=true is not possible"),
+        (["--plates", "true"], "--plates=true is not possible"),
+        (["--table=include_x"], "--table=include_x is not possible: write ./include_x"),
         (["--plates=10"], "--plates=10 is not possible; give a whole number from 1 to 9"),
         (["--plates=2.5"], "plates.*Couldn't parse '2.5' into an int"),
         (["--dish=stone"], "--dish='stone' is not possible; give one of soup, rice"),
-        (["--dish=["], r"--dish='\[' cannot be read"),
-        (["--dish=--"], "--dish='--' cannot be read"),
+        (["--dish=["], r"--dish='\[' is not possible; give one of soup, rice"),
+        (["--dish=--"], "--dish='--' is not possible; give one of soup, rice"),
+        (["--plates=["], r"--plates='\[' cannot be read"),
+        (["--plates=--"], "--plates='--' cannot be read"),
         (["--hot=very"], "hot.*Couldn't parse 'very' into a bool"),
         (["a", "--table=b"], "table is given twice"),
         (["a", "b"], "one table is needed, not 2: a b"),

@@ -9,7 +9,7 @@ from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_scene
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
-from lerobot_excav.envs.tasks.setting import check_settings, declared_settings, setting
+from lerobot_excav.setting import check_settings, declared_settings, setting
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import ConfigurationError, require, require_choice

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.tasks.registry import TASKS, env_types
-from lerobot_excav.envs.tasks.setting import declared_settings
+from lerobot_excav.setting import declared_settings
 from lerobot_excav.errors import ConfigurationError
 
 TASK_FIELDS = [(spec.id, name) for spec in TASKS.values() for name in declared_settings(spec.settings)]

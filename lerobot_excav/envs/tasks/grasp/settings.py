@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, override
 
-from lerobot_excav.envs.tasks.setting import setting, with_default
+from lerobot_excav.setting import setting, with_default
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
 
