@@ -190,4 +190,3 @@ def _is_of(value: Any, kind: Any) -> bool:
     if kind is Path:
         return isinstance(value, str | Path) and str(value) != "" and "\0" not in str(value)
     return isinstance(value, kind)
-

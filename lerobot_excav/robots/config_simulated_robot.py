@@ -7,10 +7,10 @@ from typing import cast
 from lerobot.robots import RobotConfig
 
 from lerobot_excav.envs.tasks.registry import task_of_settings
-from lerobot_excav.setting import setting
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import require
+from lerobot_excav.setting import setting
 
 ADVANCE_MODES = ("episode", "button")
 

@@ -17,8 +17,8 @@ from draccus.help_formatter import SimpleHelpFormatter
 from draccus.wrappers.docstring import HelpOrder
 
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.setting import check_settings, with_default
 from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.setting import check_settings, with_default
 
 
 @dataclass(kw_only=True)

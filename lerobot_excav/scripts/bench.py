@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
-from lerobot_excav.setting import setting, with_default
 from lerobot_excav.scripts.arguments import EnvironmentChoice
 from lerobot_excav.scripts.demos import WorkArguments, played
+from lerobot_excav.setting import setting, with_default
 
 MEASURES = ("environment", "writing", "demos")
 

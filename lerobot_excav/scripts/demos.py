@@ -21,8 +21,8 @@ from pathlib import Path
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.workers import MOST_WORKERS
 from lerobot_excav.envs.tasks.registry import task_settings
-from lerobot_excav.setting import declared_settings, setting
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
+from lerobot_excav.setting import declared_settings, setting
 
 
 @dataclass(kw_only=True)

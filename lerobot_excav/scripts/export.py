@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from lerobot_excav.setting import setting
 from lerobot_excav.scripts.arguments import Arguments
+from lerobot_excav.setting import setting
 
 
 @dataclass(kw_only=True)

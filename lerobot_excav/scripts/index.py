@@ -25,9 +25,9 @@ from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_covera
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.qc import DatasetArguments
+from lerobot_excav.setting import setting
 
 DEFAULT_EVAL_FRACTION = 0.2
 

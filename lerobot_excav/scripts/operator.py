@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
-from lerobot_excav.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import EvaluationChoice
 from lerobot_excav.scripts.demos import ResumableArguments, played
+from lerobot_excav.setting import setting
 
 PICTURE_SETTINGS = (
     *("mask_source", "mask_condition", "mask_noise", "target_overlay"),

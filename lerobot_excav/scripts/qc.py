@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from lerobot_excav.setting import setting
 from lerobot_excav.scripts.arguments import Arguments
+from lerobot_excav.setting import setting
 
 if TYPE_CHECKING:
     import pandas as pd

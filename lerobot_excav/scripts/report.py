@@ -23,13 +23,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-from lerobot_excav.setting import setting
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report import make_report, write_report
 from lerobot_excav.evaluation.report_text import report_text
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.scripts.arguments import Arguments
+from lerobot_excav.setting import setting
 
 
 @dataclass(kw_only=True)

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.tasks.registry import env_types
-from lerobot_excav.setting import declared_settings, setting
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments, parse_arguments
 from lerobot_excav.scripts.main import COMMANDS, main
+from lerobot_excav.setting import declared_settings, setting
 
 COMMAND_ARGUMENTS = {name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS}
 

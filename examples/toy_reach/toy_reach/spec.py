@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lerobot_excav.setting import setting, with_default
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.setting import setting, with_default
 
 
 @dataclass(kw_only=True)

@@ -9,10 +9,10 @@ from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_scene
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
-from lerobot_excav.setting import check_settings, declared_settings, setting
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.setting import check_settings, declared_settings, setting
 
 MOST_SCENES, MOST_FRAMES = 100_000, 100_000  # more is a slip of the keyboard: it would fill the memory
 

@@ -11,10 +11,10 @@ from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
 from lerobot_excav.envs.tasks.masked_env import RENDER_MODES
 from lerobot_excav.envs.tasks.registry import task_of_settings, task_settings
-from lerobot_excav.setting import setting
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import require
+from lerobot_excav.setting import setting
 
 
 @dataclass(kw_only=True)

@@ -7,10 +7,10 @@ import gymnasium as gym
 
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from lerobot_excav.setting import declared_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError, require, require_choice
+from lerobot_excav.setting import declared_settings
 
 TASKS: dict[str, TaskSpec] = {}
 """Tasks by their id."""

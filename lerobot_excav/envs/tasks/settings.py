@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
 from lerobot_excav.envs.masks.source import mask_source_names
-from lerobot_excav.setting import check_settings, declared_settings, setting
 from lerobot_excav.errors import require
+from lerobot_excav.setting import check_settings, declared_settings, setting
 
 SCENE_SETS = ("train", "val", "test")
 TARGETS_PER_SCENE = 4

@@ -1,6 +1,8 @@
 """Settings of `--policy.type=mask_act`."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 from lerobot.configs import PreTrainedConfig
@@ -9,10 +11,18 @@ from lerobot.optim.schedulers import ConstantWithWarmupSchedulerConfig, CosineAn
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.policies.mask_act.features import check_features, normalization
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
-from lerobot_excav.policies.mask_act.presets import PRESETS
+from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
+from lerobot_excav.setting import check_settings, setting
 
 TARGET_MASK_KEY = "observation.images.target_mask"
+MAIN_CAMERA_KEY = "observation.images.main"
+"""Camera that the mask belongs to where a policy has one of this name and none is chosen."""
+
+BACKBONES = ("resnet_small", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
+_UNDILATED = BACKBONES[:3]  # have no dilated last stage
+_GREATEST_EXPONENT = 80  # exp of it, times an action, is still a number in single precision
 
 
 def resolved[T](value: T | None) -> T:
@@ -28,65 +38,134 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     """Configure ACT with a target mask as the fourth channel of its main camera.
 
     Fields that ACT has keep ACT's meaning. A field whose default is None is filled by `preset` (or by the rule given
-    here) when the configuration is built, and a checkpoint stores the filled value.
-
-    Args:
-        preset: "paper" is LeRobot's ACT; "fast" trains many times faster on a CPU. See `presets`.
-        preset_applied: The preset that filled this configuration; written by it, never by hand.
-        mask_key: Image feature that holds the target mask, {0, 255}, registered with the main camera.
-        main_camera: Image feature that the mask belongs to. None: the first camera that is not the mask.
-        withhold_mask: Silence every path of the mask: the no-condition variant.
-        target_token: Add one token pooled under the mask to the transformer encoder.
-        coordinate_channels: Show the backbone the row and column of every pixel, as two more channels.
-        vision_backbone: "resnet_small", or a ResNet of torchvision ("resnet18", "resnet34", ...).
-        pretrained_backbone_weights: torchvision weights to start from. None, the default, downloads nothing.
-        backbone_norm: "batch" learns and averages batch statistics, "frozen" is ACT's fixed affine map. None:
-            "frozen" with pretrained weights, else "batch", which a backbone trained from scratch needs.
-        actions_per_token: Consecutive actions that one decoder query predicts; divides `chunk_size`.
-        n_action_steps: Actions executed before the next plan. None: all of `chunk_size`, or one with
-            temporal ensembling.
-        lr_schedule: "constant", or "cosine": decay to zero over the training run.
-        lr_warmup_steps: Steps over which the learning rate rises from zero.
-        optimizer_fused: Update the parameters with PyTorch's fused AdamW.
+    with it) when the configuration is built, and a checkpoint stores the filled value.
 
     Raises:
         ConfigurationError: A setting has a value that cannot be used, or two settings contradict each other.
     """
 
-    preset: str = "paper"
-    preset_applied: str | None = None
+    preset: str | None = setting(
+        f"Fills the settings that are not given: paper is LeRobot's ACT, fast trains many times faster on a CPU; left "
+        f"out: {DEFAULT_PRESET}",
+        default=None,
+        choices=tuple(PRESETS),
+    )
+    preset_applied: str | None = setting(
+        "The preset that has filled them; a checkpoint says it, nobody gives it", default=None, choices=tuple(PRESETS)
+    )
 
-    mask_key: str = TARGET_MASK_KEY
-    main_camera: str | None = None
-    withhold_mask: bool = False
-    target_token: bool = False
-    coordinate_channels: bool = False
+    mask_key: str = setting(
+        "Image feature of the target mask, {0, 255}, of the size of the main camera", default=TARGET_MASK_KEY
+    )
+    main_camera: str | None = setting(
+        f"Image feature that the mask belongs to; left out: {MAIN_CAMERA_KEY}, or the only camera of the mask's size",
+        default=None,
+    )
+    withhold_mask: bool = setting("Silence every path of the mask: the no-condition variant", default=False)
+    target_token: bool = setting("Add one token pooled under the mask, placed to the pixel", default=False)
+    coordinate_channels: bool = setting(
+        "Show the backbone the row and column of every pixel as two more channels, so that the plain fourth channel "
+        "can tell where it lies",
+        default=False,
+    )
 
-    vision_backbone: str | None = None
-    pretrained_backbone_weights: str | None = None
-    backbone_norm: str | None = None
-    dim_model: int | None = None
-    dim_feedforward: int | None = None
-    n_encoder_layers: int | None = None
-    pre_norm: bool | None = None
-    dropout: float | None = None
-    use_vae: bool | None = None
-    actions_per_token: int | None = None
-    n_action_steps: int | None = None
+    chunk_size: int = setting("Actions of a plan [frames]", default=100, low=1, high=10_000)
+    n_action_steps: int | None = setting(
+        "Actions executed per plan [frames]; left out: the whole chunk, or 1 with temporal_ensemble_coeff",
+        default=None,
+        low=1,
+        high=10_000,
+    )
+    actions_per_token: int | None = setting(
+        "Consecutive actions that one decoder query predicts; divides chunk_size", default=None, low=1, high=10_000
+    )
+    temporal_ensemble_coeff: float | None = setting(
+        "Average all plans for a moment: the i-th oldest weighs exp(-coefficient i); left out: no averaging",
+        default=None,
+        low=-10.0,
+        high=10.0,
+        hint="ACT's is 0.01.",
+    )
+    n_obs_steps: int = setting("Frames that the policy sees at a time", default=1, choices=(1,))
 
-    optimizer_lr: float | None = None
-    optimizer_lr_backbone: float | None = None
-    optimizer_fused: bool = True
-    lr_schedule: str | None = None
-    lr_warmup_steps: int | None = None
+    vision_backbone: str | None = setting("Convolutional network of the pictures", default=None, choices=BACKBONES)
+    pretrained_backbone_weights: str | None = setting(
+        "Weights of torchvision to start from, such as ResNet18_Weights.IMAGENET1K_V1; left out: random, no download",
+        default=None,
+    )
+    backbone_norm: str | None = setting(
+        "batch learns and averages batch statistics, frozen is ACT's fixed map; left out: frozen with pretrained "
+        "weights, else batch",
+        default=None,
+        choices=("batch", "frozen"),
+    )
+    replace_final_stride_with_dilation: bool | int = setting(
+        "Dilate the backbone's last stage in place of its stride; resnet50 and deeper", default=False, choices=(0, 1)
+    )
+    dim_model: int | None = setting(
+        "Width of the transformer; a multiple of n_heads and of 4", default=None, low=4, high=16_384
+    )
+    n_heads: int = setting("Heads of every attention", default=8, low=1, high=1024)
+    dim_feedforward: int | None = setting("Width of the feed-forward layers", default=None, low=1, high=65_536)
+    feedforward_activation: str = setting("Activation in them", default="relu", choices=("relu", "gelu"))
+    n_encoder_layers: int | None = setting("Layers of the encoder", default=None, low=1, high=100)
+    n_decoder_layers: int = setting("Layers of the decoder", default=1, low=1, high=100)
+    pre_norm: bool | None = setting("Normalise before each block, not after it", default=None)
+    dropout: float | None = setting("Share of activations dropped in training", default=None, low=0.0, below=1.0)
+
+    use_vae: bool | None = setting("Encode demonstrated actions into a latent in training", default=None)
+    latent_dim: int = setting("Width of that latent", default=32, low=1, high=16_384)
+    n_vae_encoder_layers: int = setting("Layers of its encoder", default=4, low=1, high=100)
+    kl_weight: float = setting("Weight of the latent's divergence in the loss", default=10.0, low=0.0, high=1e6)
+
+    optimizer_lr: float | None = setting("Learning rate", default=None, above=0.0, high=1.0)
+    optimizer_lr_backbone: float | None = setting("Learning rate of the backbone", default=None, above=0.0, high=1.0)
+    optimizer_weight_decay: float = setting("Weight decay of AdamW", default=1e-4, low=0.0, high=10.0)
+    optimizer_fused: bool = setting("Update by PyTorch's fused AdamW; the same formula in one pass", default=True)
+    lr_schedule: str | None = setting(
+        "Learning rate over the training: constant, or cosine to zero", default=None, choices=("constant", "cosine")
+    )
+    lr_warmup_steps: int | None = setting(
+        "Steps over which the learning rate rises from zero", default=None, low=0, high=2**31 - 1
+    )
+
+    # LeRobot's own, for every policy.
+    device: str | None = setting("cpu, cuda, cuda:0, mps or xpu; left out: the fastest there is", default=None)
+    use_amp: bool = setting("Compute in mixed precision", default=False)
+    use_peft: bool = setting("Whether an adapter of PEFT was trained", default=False)
+    push_to_hub: bool = setting("Upload the trained policy", default=True)
+    repo_id: str | None = setting("Repository to upload to, as user/name", default=None)
+    private: bool | None = setting("Whether that repository is private", default=None)
+    tags: list[str] | None = setting("Tags there", default=None)
+    license: str | None = setting("Licence there", default=None)
+    pretrained_path: Path | None = setting("Checkpoint to start from; --policy.path sets it", default=None)
+    pretrained_revision: str | None = setting("Revision of that checkpoint on the Hub", default=None)
 
     def __post_init__(self) -> None:
-        """Fill what the preset decides, then check every field."""
+        """Check every field, fill what the preset decides, then check fields against each other."""
+        check_settings(self, "policy.")
+        self.replace_final_stride_with_dilation = bool(self.replace_final_stride_with_dilation)
+        self._check_names()
         self._apply_preset()
         self._apply_rules()
+        self._check_plan()
         self._check_network()
-        self._check_training()
         super().__post_init__()
+
+    def _check_names(self) -> None:
+        for field in ("mask_key", "main_camera"):
+            name = getattr(self, field)
+            require(
+                name is None or re.fullmatch(r"observation\.\S+", name) is not None,
+                f"policy.{field}={name!r} is not possible; give an image feature, such as {TARGET_MASK_KEY}.",
+            )
+        require(
+            self.device is None or re.fullmatch(r"cpu|mps|xpu|cuda(:\d{1,2})?", self.device) is not None,
+            f"policy.device={self.device!r} is not possible; give cpu, cuda, cuda:0, mps or xpu.",
+        )
+        check_features("policy.input_features", self.input_features)
+        check_features("policy.output_features", self.output_features)
+        self.normalization_mapping = normalization("policy.normalization_mapping", self.normalization_mapping)
 
     def _apply_rules(self) -> None:
         if self.n_action_steps is None:
@@ -95,63 +174,66 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             self.backbone_norm = "batch" if self.pretrained_backbone_weights is None else "frozen"
 
     def _apply_preset(self) -> None:
-        require_choice("preset", self.preset, PRESETS)
         require(
-            self.preset_applied in (None, self.preset),
-            f"preset={self.preset!r} cannot change a configuration that preset={self.preset_applied!r} has filled: "
-            "a checkpoint keeps its network. Set single fields instead (for example --policy.optimizer_lr=1e-4), or "
-            "start from --policy.type=mask_act.",
+            self.preset is None or self.preset_applied in (None, self.preset),
+            f"policy.preset={self.preset!r} cannot change a configuration that preset={self.preset_applied!r} has "
+            "filled: a checkpoint keeps its network. Set single fields instead (for example "
+            "--policy.optimizer_lr=1e-4), or start from --policy.type=mask_act.",
         )
-        for name, value in PRESETS[self.preset].items():
-            if getattr(self, name) is None:
-                setattr(self, name, value)
-        self.preset_applied = self.preset
+        name = self.preset or self.preset_applied or DEFAULT_PRESET
+        is_left = any(getattr(self, field) is None for field in PRESETS[name] if field in _ACTS_OWN)
+        if self.preset_applied is None and self.preset is not None and not is_left:
+            other = differences(self, name)
+            require(
+                not other,
+                f"policy.preset={name!r} has nothing left to decide: all that ACT has is given, and these otherwise "
+                f"than in the preset: {', '.join(f'{key}={value!r}' for key, value in other.items())}. Leave out the "
+                "preset, or what it should decide.",
+            )
+        for field, value in PRESETS[name].items():
+            if getattr(self, field) is None:
+                setattr(self, field, value)
+        if is_left or self.preset is not None:
+            self.preset = self.preset_applied = name
 
-    def _check_network(self) -> None:
+    def _check_plan(self) -> None:
         k, chunk = resolved(self.actions_per_token), self.chunk_size
         require(
-            k >= 1 and chunk % k == 0,
-            f"actions_per_token={k} must divide chunk_size={chunk}; allowed: "
+            chunk % k == 0,
+            f"policy.actions_per_token={k} must divide chunk_size={chunk}; allowed: "
             f"{', '.join(str(d) for d in range(1, chunk + 1) if chunk % d == 0)}.",
         )
-        steps = resolved(self.n_action_steps)
-        require(1 <= steps <= chunk, f"n_action_steps={steps} must lie between 1 and chunk_size={chunk}, inclusive.")
+        steps, coefficient = resolved(self.n_action_steps), self.temporal_ensemble_coeff
+        require(steps <= chunk, f"policy.n_action_steps={steps} is not possible; give 1 to chunk_size={chunk}.")
         require(
-            self.temporal_ensemble_coeff is None or steps == 1,
-            f"n_action_steps={steps} must be 1 with temporal_ensemble_coeff={self.temporal_ensemble_coeff}: an "
+            coefficient is None or steps == 1,
+            f"policy.n_action_steps={steps} must be 1 with temporal_ensemble_coeff={coefficient}: an "
             "ensemble needs a plan at every step. Leave n_action_steps unset or set it to 1.",
         )
+        require(
+            coefficient is None or -coefficient * (chunk - 1) <= _GREATEST_EXPONENT,
+            f"policy.temporal_ensemble_coeff={coefficient} with chunk_size={chunk} weighs the newest plan beyond "
+            f"single precision; give {-_GREATEST_EXPONENT / max(chunk - 1, 1):.3g} or more. ACT's is 0.01.",
+        )
+
+    def _check_network(self) -> None:
         dim = resolved(self.dim_model)
         require(
             dim % self.n_heads == 0 and dim % 4 == 0,
-            f"dim_model={dim} must be a multiple of n_heads={self.n_heads} and of 4 (sines and cosines of two axes).",
+            f"policy.dim_model={dim} must be a multiple of n_heads={self.n_heads} and of 4 (sines and cosines of two "
+            "axes).",
         )
-        require_choice("backbone_norm", self.backbone_norm, ("batch", "frozen"))
-        backbone = resolved(self.vision_backbone)
+        backbone, weights = resolved(self.vision_backbone), self.pretrained_backbone_weights
         require(
-            backbone.startswith("resnet"),
-            f"vision_backbone={backbone!r} is not a ResNet; allowed: resnet_small, resnet18, resnet34, resnet50, ...",
-        )
-        require(
-            backbone != "resnet_small" or self.pretrained_backbone_weights is None,
-            f"pretrained_backbone_weights={self.pretrained_backbone_weights!r} do not exist for "
-            "vision_backbone='resnet_small'; set them to null or use resnet18.",
+            backbone not in _UNDILATED or not self.replace_final_stride_with_dilation,
+            f"policy.replace_final_stride_with_dilation=true does not exist for vision_backbone={backbone!r}; set it "
+            f"to false, or use {', '.join(BACKBONES[len(_UNDILATED) :])}.",
         )
         require(
-            backbone != "resnet_small" or not self.replace_final_stride_with_dilation,
-            "replace_final_stride_with_dilation has no meaning for vision_backbone='resnet_small', whose stride is "
-            "16 already; set it to false.",
+            weights is None or weights in _known_weights(backbone),
+            f"policy.pretrained_backbone_weights={weights!r} do not exist for vision_backbone={backbone!r}; allowed: "
+            f"{', '.join(_known_weights(backbone)) or 'none; set them to null or use resnet18'}.",
         )
-
-    def _check_training(self) -> None:
-        require_choice("lr_schedule", self.lr_schedule, ("constant", "cosine"))
-        warmup = resolved(self.lr_warmup_steps)
-        require(warmup >= 0, f"lr_warmup_steps={warmup} must not be negative; 0 starts at the full rate.")
-        for name in ("optimizer_lr", "optimizer_lr_backbone"):
-            rate = getattr(self, name)
-            require(rate > 0, f"{name}={rate} must be positive.")
-        rate = resolved(self.dropout)
-        require(0 <= rate < 1, f"dropout={rate} must lie in [0, 1).")
 
     @property
     def camera_keys(self) -> list[str]:
@@ -160,8 +242,24 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
 
     @property
     def main_camera_key(self) -> str:
-        """Image feature that the mask is joined to."""
-        return self.main_camera if self.main_camera is not None else self.camera_keys[0]
+        """Image feature that the mask is joined to.
+
+        Raises:
+            ConfigurationError: Several cameras have the mask's size, and nothing says which it is.
+        """
+        cameras, mask = self.camera_keys, self.image_features.get(self.mask_key)
+        if self.main_camera is not None:
+            return self.main_camera
+        if MAIN_CAMERA_KEY in cameras:
+            return MAIN_CAMERA_KEY
+        size = None if mask is None else tuple(mask.shape)[1:]
+        fitting = [key for key in cameras if size in (None, tuple(self.image_features[key].shape)[1:])]
+        require(
+            len(fitting) < 2 or self.withhold_mask,
+            f"policy.main_camera=None is not enough: the mask may belong to {' or '.join(fitting)}. Name the one that "
+            f"it marks, for example --policy.main_camera={(fitting or cameras)[0]}.",
+        )
+        return (fitting or cameras)[0]
 
     def validate_features(self) -> None:
         """Check the image features against each other.
@@ -170,10 +268,16 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         `set_dataset_feature_metadata` refuses a dataset without a mask, `views` refuses such a batch.
 
         Raises:
-            ConfigurationError: No camera, an unknown main camera, a camera that is not RGB, or a mask whose size is
-                not that of the main camera.
+            ConfigurationError: No action, no camera, an unknown main camera or several that may be it, a camera that is
+                not RGB, or a mask whose size is not that of the main camera.
         """
         cameras = self.camera_keys
+        check_features("policy.input_features", self.input_features)
+        check_features("policy.output_features", self.output_features)
+        require(
+            self.action_feature is not None,
+            f"policy.output_features={sorted(self.output_features or {})} lacks 'action', which the policy predicts.",
+        )
         require(bool(cameras), f"mask_act needs a camera; its image features are {sorted(self.image_features)}.")
         require(
             self.main_camera_key != self.mask_key,
@@ -239,3 +343,16 @@ def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str
         f"its shape must be {allowed[0]} or {allowed[1]} (channels, height, width). Render both at one size, or set "
         "--policy.main_camera to the camera that the mask belongs to.",
     )
+
+
+_ACTS_OWN = frozenset(field.name for field in fields(ACTConfig))
+
+
+def _known_weights(backbone: str) -> list[str]:
+    """Return the names of torchvision's weights for a backbone, as its functions take them."""
+    if backbone == "resnet_small":
+        return []
+    from torchvision.models import get_model_weights  # slow to import, and asked for by few
+
+    kind = get_model_weights(backbone)
+    return [f"{prefix}{name}" for prefix in (f"{kind.__name__}.", "") for name in kind.__members__]

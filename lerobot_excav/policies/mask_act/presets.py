@@ -45,3 +45,10 @@ FAST: dict[str, Any] = {
 }
 
 PRESETS: dict[str, dict[str, Any]] = {"paper": PAPER, "fast": FAST}
+DEFAULT_PRESET = "paper"
+
+
+def differences(settings: Any, preset: str) -> dict[str, Any]:
+    """Return the settings that a preset would decide and that have another value, by name."""
+    values = {name: getattr(settings, name) for name in PRESETS[preset]}
+    return {name: value for name, value in values.items() if value not in (None, PRESETS[preset][name])}

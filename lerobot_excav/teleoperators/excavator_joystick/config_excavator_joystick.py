@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
-from lerobot_excav.setting import check_settings, setting
 from lerobot_excav.errors import require, require_choice
+from lerobot_excav.setting import check_settings, setting
 from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PATTERNS
 
 BUTTONS = (

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.tasks.registry import TASKS, env_types
-from lerobot_excav.setting import declared_settings
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.setting import declared_settings
 
 TASK_FIELDS = [(spec.id, name) for spec in TASKS.values() for name in declared_settings(spec.settings)]
 PLAYED_FIELDS = [(t, name) for t in env_types() for name in declared_settings(DemonstrationSettings)]

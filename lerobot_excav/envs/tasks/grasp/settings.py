@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, override
 
-from lerobot_excav.setting import setting, with_default
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
+from lerobot_excav.setting import setting, with_default
 
 EPISODE_DURATION_S = 8.0
 """Time limit unless another is asked for [s] (kind: paper, 400 frames at 50 Hz)."""

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
-from lerobot_excav.setting import setting, with_default
 from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.setting import setting, with_default
 
 
 @dataclass(kw_only=True)

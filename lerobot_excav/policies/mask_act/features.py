@@ -1,0 +1,74 @@
+"""What the features of a policy, and how they are normalised, have to look like."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from lerobot.configs import FeatureType, NormalizationMode, PolicyFeature
+from lerobot.utils.constants import ACTION, OBS_STATE
+
+from lerobot_excav.errors import require, shown
+
+NORMALISED = (FeatureType.VISUAL, FeatureType.STATE, FeatureType.ACTION)  # kinds whose normalisation has to be told
+_MOST = 100_000  # entries of a vector, or pixels along an axis: more is a slip of the keyboard
+
+
+def check_features(field: str, features: Any) -> None:
+    """Check features by name, None or empty where they are not known yet.
+
+    Raises:
+        ConfigurationError: A feature is not one, or its shape is not what the network takes.
+    """
+    require(
+        features is None or isinstance(features, Mapping), f"{field}={shown(features)} does not map names to features"
+    )
+    for name, feature in (features or {}).items():
+        place = f"{field}[{name!r}]={shown(feature)}"
+        require(
+            isinstance(name, str)
+            and bool(name)
+            and isinstance(feature, PolicyFeature)
+            and isinstance(feature.type, FeatureType),
+            f"{place} is not a feature; give a type ({', '.join(kind.value for kind in FeatureType)}) and a shape.",
+        )
+        require(
+            _is_shape(feature.shape, _axes(name, feature.type)),
+            f"{place} has a shape that is not possible; give (channels, height, width) for pictures and (length,) "
+            f"for {OBS_STATE}, environment state and {ACTION}, in whole numbers from 1 to {_MOST}.",
+        )
+
+
+def _axes(name: str, kind: FeatureType) -> int | None:
+    """Return how many axes the network takes; None where it does not read the feature."""
+    is_vector = name in (OBS_STATE, ACTION) or kind is FeatureType.ENV
+    return 3 if kind is FeatureType.VISUAL else 1 if is_vector else None
+
+
+def _is_shape(shape: Any, axes: int | None) -> bool:
+    return (
+        isinstance(shape, tuple | list)
+        and bool(shape)
+        and axes in (None, len(shape))
+        and all(isinstance(length, int) and length is not True and 1 <= length <= _MOST for length in shape)
+    )
+
+
+def normalization(field: str, mapping: Any) -> dict[str, NormalizationMode]:
+    """Return how kinds of features are normalised, by the name of the kind.
+
+    Raises:
+        ConfigurationError: A kind or a mode is not known, or a kind that every policy has is left out: LeRobot would
+            not normalise it, without a word.
+    """
+    kinds, modes = [kind.value for kind in FeatureType], [mode.value for mode in NormalizationMode]
+    is_known = isinstance(mapping, Mapping) and all(
+        isinstance(kind, str) and kind in kinds and isinstance(mode, str) and mode in modes
+        for kind, mode in mapping.items()
+    )
+    missing = [] if not is_known else [kind.value for kind in NORMALISED if kind.value not in mapping]
+    require(
+        is_known and not missing,
+        f"{field}={shown(mapping)} is not possible; give {', '.join(kind.value for kind in NORMALISED)}"
+        f"{f' ({missing[0]} is missing)' if missing else ''}, each with one of {', '.join(modes)}; other kinds: "
+        f"{', '.join(kinds)}.",
+    )
+    return {FeatureType(kind).value: NormalizationMode(mode) for kind, mode in mapping.items()}
