@@ -2,6 +2,7 @@
 
 Map of the package; dependencies run from top to bottom:
 
+- `errors`, `setting`: what all may use; they know nobody.
 - `envs.constants`, `envs.soil`: deformable soil; knows nobody, and nothing of MuJoCo.
 - `envs.machines`: bodies, control and cameras of the excavator and of the arm; they know no scene and no target.
 - `envs.masks`: commands, and the sources that show them as masks.
@@ -11,7 +12,7 @@ Map of the package; dependencies run from top to bottom:
 - `datasets`: paired demonstrations, by what is done with them.
 - `evaluation`: metrics, intervals, reports.
 - `scripts`: the subcommands of `lerobot-excav`.
-- `policies`: `mask_act`; imports LeRobot only.
+- `policies`: `mask_act`; imports LeRobot and the first line only.
 - `plugin`: the one list of what is registered with LeRobot; only LeRobot imports it.
 
 Importing this package registers the gym ids, such as `lerobot_excav/Scoop-v0`, and loads nothing heavy.

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "lerobot_excav"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-# Each layer may import itself, what stands before it in its row, and `errors`. Policies stand alone; the last of a row
+# Each layer may import itself, what stands before it in its row, and what all share. Policies stand alone; the last of a row
 # may use the other row. `plugin`, the list of what is registered with LeRobot, is imported by LeRobot alone.
 LAYERS = [
     [
@@ -18,6 +18,7 @@ LAYERS = [
     ],
     ["policies"],
 ]
+SHARED = {"errors", "setting"}
 DATASET_LAYERS = ["format", "pairs", "record", "complete", "check"]
 FREE = {"plugin", "scripts.export"}
 
@@ -57,11 +58,16 @@ def test_imports_run_one_way(path):
     row, rank = part_of(importer)
     for imported in imported_modules(path):
         assert imported != "plugin", f"{importer} imports the list of what is registered"
-        if imported == "errors":
+        if imported in SHARED:
             continue
         imported_row, imported_rank = part_of(imported)
         assert imported_row == row, f"{importer} imports {imported}"
         assert imported_rank <= rank, f"{importer} imports {imported}"
+
+
+def test_what_all_share_knows_nobody():
+    for name in SHARED:
+        assert set(imported_modules(PACKAGE / f"{name}.py")) <= SHARED
 
 
 def test_datasets_are_read_before_they_are_recorded_completed_and_checked():

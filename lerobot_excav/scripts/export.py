@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from lerobot_excav.envs.tasks.registry import env_types
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments
 from lerobot_excav.setting import setting
 
@@ -28,7 +30,9 @@ class ExportArguments(Arguments):
     checkpoint: Path | None = setting("pretrained_model folder of a run of lerobot-train", default=None)
     out: Path | None = setting("Folder to write", default=None)
     title: str = setting("Heading of the card", default="mask_act")
-    env: str = setting("Environment in the card's command, as in --env.type", default="excavator")
+    env: str = setting(
+        "Environment in the card's command, as in --env.type", default="excavator", choices=lambda: tuple(env_types())
+    )
     results: Path | None = setting("Markdown file for the card's section Evaluation", default=None)
     license: str = setting("Licence in the card, as the Hugging Face Hub spells it", default="apache-2.0")
 
@@ -51,13 +55,20 @@ def run(arguments: ExportArguments) -> int:
     facts = CardFacts(
         title=arguments.title,
         env_type=arguments.env,
-        results=arguments.results.read_text() if arguments.results is not None else "",
+        results=_text(arguments.results) if arguments.results is not None else "",
         license=arguments.license,
     )
     export_checkpoint(checkpoint, out, facts)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"--results={path} is not text in UTF-8 ({error}); give a Markdown file") from error
 
 
 ARGUMENTS = ExportArguments

@@ -31,3 +31,14 @@ def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp
 def test_what_is_not_a_checkpoint_is_an_error_that_says_what_to_give(tmp_path, checkpoint):
     with pytest.raises(ConfigurationError, match=r"checkpoint.*give the pretrained_model"):
         run(ExportArguments(checkpoint=checkpoint, out=tmp_path / "small"))
+
+
+def test_results_that_are_not_text_are_named(tmp_path):
+    (tmp_path / "table.md").write_bytes(b"\xff\xfe98 of 100")
+    with pytest.raises(ConfigurationError, match=r"--results=.*table\.md is not text"):
+        run(ExportArguments(checkpoint=Path("run"), out=tmp_path / "small", results=tmp_path / "table.md"))
+
+
+def test_the_card_names_an_environment_that_exists():
+    with pytest.raises(ConfigurationError, match=r"--env='lathe' is not possible; give one of excavator, fr5_grasp"):
+        ExportArguments(env="lathe")

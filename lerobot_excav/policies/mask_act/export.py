@@ -5,17 +5,18 @@ import shutil
 from pathlib import Path
 
 import torch
+from draccus.utils import DraccusException
 from lerobot.configs import PreTrainedConfig
 from safetensors.torch import save_file
 from torch import Tensor
 
 from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, read_json, require_processors
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
-from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
+from lerobot_excav.policies.mask_act.model_card import TRAINING_CONFIG, CardFacts, model_card
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
-PROCESSORS = ("policy_preprocessor*", "policy_postprocessor*")
 TRAINING_ONLY = "model.action_encoder."  # the encoder of the variational latent, which is zero at run time
 
 
@@ -30,16 +31,18 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
     Args:
         checkpoint: A `pretrained_model` folder of lerobot-train.
         out: Folder to write: `config.json`, `model.safetensors`, the processors, `README.md`; it is returned. Files of
-            an earlier export in it are replaced.
+            an earlier export in it are replaced; any other folder must be empty.
         facts: What the model card tells beyond what the checkpoint knows.
 
     Raises:
-        ConfigurationError: The folder does not hold a checkpoint of `mask_act`, is the one to write, or holds a
-            weight beyond half precision.
+        ConfigurationError: The folder does not hold a whole checkpoint of `mask_act`, holds a weight beyond half
+            precision, or is the one to write, or that one holds something else.
     """
-    require_checkpoint(checkpoint)
+    config = read_config(checkpoint)
     require(checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder.")
-    policy = MaskACTPolicy.from_pretrained(checkpoint)
+    _require_own(out)
+    require_processors(checkpoint)
+    policy = MaskACTPolicy.from_pretrained(checkpoint, config=config)
     weights = run_time_weights(policy)
     config = copy.copy(policy.config)
     config.use_vae, config.pretrained_path = False, None
@@ -47,8 +50,8 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
     out.mkdir(parents=True, exist_ok=True)
     save_file(weights, out / WEIGHTS, metadata={"format": "pt"})
     config.save_pretrained(out)
-    for pattern in PROCESSORS:
-        for file in sorted(checkpoint.glob(pattern)):
+    for name in PROCESSORS:
+        for file in sorted(checkpoint.glob(f"{Path(name).stem}*")):
             shutil.copyfile(file, out / file.name)
     card.save(out / CARD)
     return out
@@ -79,16 +82,37 @@ def parameter_count(policy: MaskACTPolicy) -> int:
     return sum(value.numel() for name, value in policy.named_parameters() if not name.startswith(TRAINING_ONLY))
 
 
-def require_checkpoint(checkpoint: Path) -> None:
-    """Raise `ConfigurationError` unless a folder holds a policy, and one of type `mask_act`."""
+def _require_own(out: Path) -> None:
+    """Raise unless a folder is missing, empty, or an earlier export."""
+    names = {path.name for path in out.iterdir()} if out.is_dir() else set()
+    is_export = {CONFIG, WEIGHTS, CARD} <= names and TRAINING_CONFIG not in names
+    require(
+        not names or is_export,
+        f"out={out} holds something else than an earlier export ({', '.join(sorted(names)[:3])}); choose another "
+        "folder, or empty it.",
+    )
+
+
+def read_config(checkpoint: Path) -> MaskACTConfig:
+    """Return the settings of the policy in a folder.
+
+    Raises:
+        ConfigurationError: There is none, it is of another type than `mask_act`, or its settings cannot be used.
+    """
     missing = [name for name in (CONFIG, WEIGHTS) if not (checkpoint / name).is_file()]
     require(
         not missing,
         f"checkpoint={checkpoint} lacks {' and '.join(missing)}; give the pretrained_model folder of a run of "
         "lerobot-train, for example outputs/train/checkpoints/last/pretrained_model.",
     )
-    config = PreTrainedConfig.from_pretrained(checkpoint)
-    if not isinstance(config, MaskACTConfig):
-        raise ConfigurationError(
-            f"checkpoint={checkpoint} holds a policy of type {config.type!r}; only mask_act can be exported."
-        )
+    kind = read_json(checkpoint / CONFIG).get("type")
+    require(
+        kind == MaskACTConfig.get_choice_name(MaskACTConfig),
+        f"checkpoint={checkpoint} holds a policy of type {kind!r}; only mask_act can be exported.",
+    )
+    try:
+        config: MaskACTConfig = PreTrainedConfig.from_pretrained(checkpoint)
+    except (ConfigurationError, DraccusException, TypeError, ValueError) as error:
+        raise ConfigurationError(f"{checkpoint / CONFIG} cannot be used: {' '.join(str(error).split())}") from error
+    config.validate_features()
+    return config

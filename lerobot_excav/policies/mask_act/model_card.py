@@ -1,6 +1,5 @@
 """The README of a checkpoint, in the form of LeRobot's model cards."""
 
-import json
 import math
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -9,7 +8,10 @@ from typing import Any
 
 from huggingface_hub import ModelCard, ModelCardData
 
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.policies.mask_act.checkpoint import read_json
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.presets import differences
 
 TEMPLATE = Path(__file__).with_name("model_card.md.jinja")
 TRAINING_CONFIG = "train_config.json"
@@ -30,6 +32,9 @@ def model_card(checkpoint: Path, config: MaskACTConfig, parameters: int, facts: 
     """Write the card of a policy with a number of parameters, and the metadata that the Hugging Face Hub reads.
 
     Training settings are read from the `pretrained_model` folder if they lie there. `str` gives the card's Markdown.
+
+    Raises:
+        ConfigurationError: They are damaged.
     """
     training = training_facts(checkpoint)
     metadata = ModelCardData(
@@ -46,6 +51,7 @@ def model_card(checkpoint: Path, config: MaskACTConfig, parameters: int, facts: 
         template_path=str(TEMPLATE),
         facts=facts,
         config=config,
+        preset=_preset(config),
         parameters=parameters,
         features=[(name, feature.type.value, tuple(feature.shape)) for name, feature in features.items()],
         training=training,
@@ -56,15 +62,25 @@ def model_card(checkpoint: Path, config: MaskACTConfig, parameters: int, facts: 
 
 def training_facts(checkpoint: Path) -> dict[str, str]:
     """Return how a `pretrained_model` folder was trained, as far as the files in and beside it tell; no local paths."""
-    settings = _read(checkpoint / TRAINING_CONFIG)
-    if not settings:
+    if not (checkpoint / TRAINING_CONFIG).is_file():
         return {}
+    try:
+        return _training_facts(checkpoint, read_json(checkpoint / TRAINING_CONFIG))
+    except (AttributeError, KeyError, TypeError) as error:
+        raise ConfigurationError(
+            f"{checkpoint / TRAINING_CONFIG} is damaged ({type(error).__name__}: {error}); restore it, or remove it to "
+            "leave the training out of the card."
+        ) from error
+
+
+def _training_facts(checkpoint: Path, settings: dict[str, Any]) -> dict[str, str]:
     dataset, optimizer = settings["dataset"], settings.get("optimizer") or {}
+    step = checkpoint / TRAINING_STEP
     facts = {
         "Dataset": dataset["repo_id"],
         "Episodes": len(dataset["episodes"]) if dataset.get("episodes") else "all",
         "Held out for validation": _held_out(dataset),
-        "Steps": _read(checkpoint / TRAINING_STEP).get("step", settings["steps"]),
+        "Steps": (read_json(step) if step.is_file() else {}).get("step", settings["steps"]),
         "Batch size": settings["batch_size"],
         "Learning rate": optimizer.get("lr"),
         "Seed": settings["seed"],
@@ -81,5 +97,9 @@ def _held_out(dataset: dict[str, Any]) -> str:
     return str(math.ceil(len(dataset["episodes"]) * share))
 
 
-def _read(path: Path) -> dict[str, Any]:
-    return dict(json.loads(path.read_text())) if path.is_file() else {}
+def _preset(config: MaskACTConfig) -> str:
+    """Return the preset, with what is otherwise than in it."""
+    if config.preset is None:
+        return "none"
+    other = [f"{name}={value}" for name, value in differences(config, config.preset).items()]
+    return f"{config.preset}, with {', '.join(other)}" if other else config.preset

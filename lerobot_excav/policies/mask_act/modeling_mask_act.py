@@ -2,7 +2,7 @@
 
 import copy
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, override
 
 import torch
 import torch.nn.functional as F  # noqa: N812
@@ -12,6 +12,7 @@ from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_STATE
 from torch import Tensor
 
 from lerobot_excav.errors import require_choice
+from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights, require_processors
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
@@ -57,15 +58,31 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     def from_pretrained(
         cls, pretrained_name_or_path: str | Path, *, config: MaskACTConfig | None = None, **kwargs: Any
     ) -> Self:
-        """Load a policy as LeRobot does, without fetching the weights its backbone once started from."""
+        """Load a policy as LeRobot does, strictly, and without fetching the weights its backbone once started from.
+
+        Raises:
+            ConfigurationError: Weights are missing, left over, misshaped or not finite, or the processors beside them
+                are damaged.
+        """
         if config is None:
             hub = {key: value for key, value in kwargs.items() if key != "strict"}
             config = PreTrainedConfig.from_pretrained(pretrained_name_or_path, **hub)
         if config.pretrained_path is None:
             config = copy.copy(config)
             config.pretrained_path = Path(pretrained_name_or_path)
+        folder = Path(pretrained_name_or_path)
+        # LeRobot names what is missing if none is there, as beside a policy that was saved alone.
+        if any((folder / name).exists() for name in PROCESSORS):
+            require_processors(folder)
         policy: Self = super().from_pretrained(pretrained_name_or_path, config=config, **kwargs)
         return policy
+
+    @classmethod
+    @override
+    def _load_as_safetensor(cls, model: Self, model_file: str, map_location: str, strict: bool) -> Self:
+        # LeRobot asks for no strictness: a policy would act on random weights in place of missing ones.
+        load_weights(model, Path(model_file))
+        return model
 
     def reset(self) -> None:
         """Forget plans and targets; call it whenever the environments are reset."""

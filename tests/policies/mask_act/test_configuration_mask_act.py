@@ -6,6 +6,7 @@ import pytest
 import torch
 from lerobot.configs import PreTrainedConfig
 from lerobot.optim import AdamWConfig
+from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
@@ -49,17 +50,24 @@ def test_configuration_survives_its_file_and_takes_overrides(tmp_path, config):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"preset": "quick"}, r"preset='quick'.*'paper', 'fast'"),
+        ({"preset": "quick"}, r"policy.preset='quick' is not possible; give one of paper, fast"),
         ({"actions_per_token": 3}, r"actions_per_token=3 must divide chunk_size=8.*1, 2, 4, 8"),
         ({"n_action_steps": 9}, r"n_action_steps=9.*chunk_size=8"),
         ({"n_action_steps": 0}, r"n_action_steps=0"),
+        ({"temporal_ensemble_coeff": -1.0, "chunk_size": 100}, r"temporal_ensemble_coeff=-1.0 .*give -0.808 or more"),
+        ({"output_features": {}}, r"output_features=\[\] lacks 'action'"),
         ({"temporal_ensemble_coeff": 0.01, "n_action_steps": 2}, r"n_action_steps=2 must be 1"),
         ({"dim_model": 30}, r"dim_model=30.*n_heads=4"),
-        ({"backbone_norm": "group"}, r"backbone_norm='group'.*'batch', 'frozen'"),
+        ({"backbone_norm": "group"}, r"backbone_norm='group'.*batch, frozen"),
         ({"vision_backbone": "vit_b_16"}, r"vision_backbone='vit_b_16'.*resnet_small"),
         ({"pretrained_backbone_weights": "DEFAULT"}, r"pretrained_backbone_weights='DEFAULT'.*resnet18"),
-        ({"replace_final_stride_with_dilation": True}, r"replace_final_stride_with_dilation"),
-        ({"lr_schedule": "linear"}, r"lr_schedule='linear'.*'constant', 'cosine'"),
+        ({"vision_backbone": "resnet18", "pretrained_backbone_weights": "BEST"}, r"'BEST'.*ResNet18_Weights.IMAGENET"),
+        ({"replace_final_stride_with_dilation": True}, r"replace_final_stride_with_dilation=true.*resnet_small.*50"),
+        (
+            {"replace_final_stride_with_dilation": True, "vision_backbone": "resnet18"},
+            r"for vision_backbone='resnet18'",
+        ),
+        ({"lr_schedule": "linear"}, r"lr_schedule='linear'.*constant, cosine"),
         ({"lr_warmup_steps": -1}, r"lr_warmup_steps=-1"),
         ({"optimizer_lr": 0.0}, r"optimizer_lr=0.0"),
         ({"optimizer_lr_backbone": -1.0}, r"optimizer_lr_backbone=-1.0"),
@@ -80,7 +88,7 @@ def test_the_command_line_says_which_setting_is_bad(capsys):
     with pytest.raises((SystemExit, draccus.utils.ParsingError, ConfigurationError)) as caught:
         draccus.parse(MaskACTConfig, args=["--preset=quick"])
     said = f"{caught.value} {capsys.readouterr().err}"
-    assert "preset='quick' is not known; allowed: 'paper', 'fast'." in said
+    assert "policy.preset='quick' is not possible; give one of paper, fast." in said
 
 
 def test_open_settings_follow_from_others(config):
@@ -89,9 +97,44 @@ def test_open_settings_follow_from_others(config):
     weights = {"vision_backbone": "resnet18", "pretrained_backbone_weights": "ResNet18_Weights.IMAGENET1K_V1"}
     assert (config().backbone_norm, config(**weights).backbone_norm) == ("batch", "frozen")
     features = dict.fromkeys((MASK, CAB, MAIN), PICTURE)
-    assert config(input_features=features).main_camera_key == CAB
-    assert config(input_features=features, main_camera=MAIN).main_camera_key == MAIN
     assert config(input_features=features, mask_key=CAB).camera_keys == [MASK, MAIN]
+
+
+WRIST, TOP = "observation.images.wrist", "observation.images.top"
+SMALL = visual(3, 16, 24)
+
+
+@pytest.mark.parametrize(
+    ("features", "settings", "camera"),
+    [
+        ({MASK: PICTURE, CAB: PICTURE, MAIN: PICTURE}, {}, MAIN),
+        ({MASK: PICTURE, CAB: PICTURE, MAIN: PICTURE}, {"main_camera": CAB}, CAB),
+        ({WRIST: SMALL, TOP: PICTURE, MASK: PICTURE}, {}, TOP),
+        ({WRIST: PICTURE}, {}, WRIST),
+        ({WRIST: PICTURE, TOP: PICTURE, MASK: PICTURE}, {"withhold_mask": True}, WRIST),
+    ],
+)
+def test_the_mask_belongs_to_the_camera_that_is_called_main_or_alone_has_its_size(config, features, settings, camera):
+    built = config(input_features=features, **settings)
+    built.validate_features()
+    assert built.main_camera_key == camera
+
+
+@pytest.mark.parametrize("features", [{WRIST: PICTURE, TOP: PICTURE, MASK: PICTURE}, {WRIST: SMALL, TOP: PICTURE}])
+def test_two_cameras_that_the_mask_may_belong_to_are_asked_about(config, features):
+    with pytest.raises(ConfigurationError, match=r"may belong to .*wrist or .*top.*--policy\.main_camera="):
+        config(input_features=features).validate_features()
+
+
+def test_a_preset_that_has_nothing_to_decide_is_refused_and_never_recorded():
+    acts_own = {**vars(ACTConfig(device="cpu", pretrained_backbone_weights=None))}
+    with pytest.raises(ConfigurationError, match=r"preset='fast' has nothing left to decide.*dim_model=512"):
+        MaskACTConfig(**acts_own, preset="fast")
+    plain = MaskACTConfig(**acts_own)
+    assert (plain.preset, plain.preset_applied, plain.dim_model) == (None, None, 512)
+    assert (replace(plain).preset_applied, MaskACTConfig(**acts_own, preset="paper").preset_applied) == (None, "paper")
+    with pytest.raises(ConfigurationError, match=r"preset='fast' has nothing left to decide"):
+        replace(plain, preset="fast")
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,14 @@
 import json
+import re
+import shutil
+from functools import wraps
 
 import pytest
 import torch
 from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.policies.factory import make_pre_post_processors
-from safetensors.torch import load_file
+from safetensors.torch import load_file, save_file
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.export import export_checkpoint
@@ -13,9 +16,10 @@ from lerobot_excav.policies.mask_act.model_card import CardFacts
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 from lerobot_excav.policies.mask_act.processor_mask_act import make_mask_act_pre_post_processors
 
-from .conftest import INPUT_FEATURES, OUTPUT_FEATURES, STATE
+from .conftest import CAB, INPUT_FEATURES, MAIN, OUTPUT_FEATURES, STATE
 
-WEIGHTS = "model.safetensors"
+WEIGHTS, ACTION = "model.safetensors", "action"
+STATISTICS = "policy_preprocessor_step_3_normalizer_processor.safetensors"
 
 
 @pytest.fixture
@@ -26,7 +30,11 @@ def checkpoint(awake, batch, tmp_path):
         policy.forward(batch(seed=seed, actions=True))
     folder = tmp_path / "pretrained_model"
     policy.save_pretrained(folder)
-    stats = {STATE: {"mean": torch.full((8,), 2.0), "std": torch.full((8,), 4.0)}}
+    stats = {
+        STATE: {"mean": torch.full((8,), 2.0), "std": torch.full((8,), 4.0)},
+        ACTION: {"mean": torch.zeros(4), "std": torch.ones(4)},
+        **{camera: {"mean": torch.zeros(3, 1, 1), "std": torch.ones(3, 1, 1)} for camera in (MAIN, CAB)},
+    }
     for pipeline in make_mask_act_pre_post_processors(policy.config, stats):
         pipeline.save_pretrained(folder)
     dataset = {"repo_id": "local/x", "root": str(tmp_path)}
@@ -86,6 +94,141 @@ def test_a_second_export_replaces_the_first_but_not_the_checkpoint(checkpoint, e
         export_checkpoint(checkpoint, checkpoint)
 
 
+def test_a_folder_that_is_not_an_export_is_kept(checkpoint, tmp_path):
+    thesis, training = tmp_path / "thesis", shutil.copytree(checkpoint, tmp_path / "another")
+    thesis.mkdir()
+    for folder in (thesis, training):
+        (folder / "README.md").write_text("mine")
+        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        with pytest.raises(ConfigurationError, match=rf"out={folder} holds something else"):
+            export_checkpoint(checkpoint, folder)
+        assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def change_tensors(change):
+    @wraps(change)
+    def damage(file):
+        tensors = load_file(file)
+        change(tensors)
+        save_file(tensors, file)
+
+    return damage
+
+
+def change_settings(change):
+    @wraps(change)
+    def damage(file):
+        content = json.loads(file.read_text())
+        change(content)
+        file.write_text(json.dumps(content))
+
+    return damage
+
+
+@change_tensors
+def without_weights(tensors):
+    for name in [name for name in tensors if name.endswith(".weight")]:
+        del tensors[name]
+
+
+@change_tensors
+def with_another(tensors):
+    tensors["model.extra.weight"] = torch.zeros(2)
+
+
+@change_tensors
+def misshaped(tensors):
+    tensors["model.action_head.bias"] = torch.zeros(3)
+
+
+@change_tensors
+def of_whole_numbers(tensors):
+    tensors["model.action_head.bias"] = tensors["model.action_head.bias"].int()
+
+
+@change_tensors
+def not_a_number(tensors):
+    next(value for value in tensors.values() if value.is_floating_point()).view(-1)[0] = torch.nan
+
+
+@change_tensors
+def without_means(tensors):
+    for name in [name for name in tensors if name.endswith(".mean")]:
+        del tensors[name]
+
+
+@change_tensors
+def of_another_robot(tensors):
+    tensors["observation.state.mean"] = torch.zeros(5)
+
+
+@change_settings
+def without_steps(content):
+    content["steps"] = []
+
+
+def truncated(file):
+    file.write_bytes(file.read_bytes()[:-5])
+
+
+def emptied(file):
+    file.write_bytes(b"")
+
+
+def turned_to_noise(file):
+    file.write_bytes(bytes(range(256)))
+
+
+def removed(file):
+    file.unlink()
+
+
+BROKEN_FILES = [(d, name) for d in (truncated, emptied, turned_to_noise) for name in (WEIGHTS, STATISTICS)]
+DAMAGES = [
+    *BROKEN_FILES,
+    *[(without_weights, WEIGHTS), (with_another, WEIGHTS), (misshaped, WEIGHTS), (of_whole_numbers, WEIGHTS)],
+    *[(not_a_number, WEIGHTS), (not_a_number, STATISTICS), (removed, STATISTICS), (without_means, STATISTICS)],
+    *[(of_another_robot, STATISTICS), (without_steps, "policy_postprocessor.json")],
+    *[(d, "policy_preprocessor.json") for d in (truncated, emptied, turned_to_noise, removed)],
+]
+
+
+@pytest.mark.parametrize(("damage", "name"), DAMAGES, ids=lambda value: getattr(value, "__name__", value))
+def test_a_damaged_file_is_named_and_neither_exported_nor_run(checkpoint, tmp_path, damage, name):
+    damage(checkpoint / name)
+    with pytest.raises(ConfigurationError, match=re.escape(name)):
+        export_checkpoint(checkpoint, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(ConfigurationError, match=re.escape(name)):
+        MaskACTPolicy.from_pretrained(checkpoint)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (truncated, "cannot be read"),
+        (turned_to_noise, "cannot be read"),
+        (change_settings(lambda content: content.pop("type")), "a policy of type None"),
+        (change_settings(lambda content: content.update(type="act")), "a policy of type 'act'; only mask_act"),
+        (change_settings(lambda content: content.update(colour=3)), "`colour` are not valid"),
+        (change_settings(lambda content: content.update(n_heads=0)), "policy.n_heads=0"),
+        (change_settings(lambda content: content.update(n_heads="many")), "n_heads.*'many'"),
+        (change_settings(lambda content: content.update(output_features={})), "lacks 'action'"),
+        (change_settings(lambda content: content["input_features"][STATE].update(shape=[0])), r"observation\.state"),
+        (lambda file: file.write_text("[]"), "not settings by name"),
+    ],
+)
+def test_settings_that_cannot_be_used_are_named(checkpoint, tmp_path, damage, message):
+    damage(checkpoint / "config.json")
+    with pytest.raises(ConfigurationError, match=message):
+        export_checkpoint(checkpoint, tmp_path / "out")
+
+
+def test_a_policy_that_was_saved_alone_loads_without_processors(policy, tmp_path):
+    policy().save_pretrained(tmp_path)
+    assert MaskACTPolicy.from_pretrained(tmp_path).config.dim_model == 32
+
+
 def test_a_folder_without_a_checkpoint_is_refused(tmp_path):
     with pytest.raises(ConfigurationError, match=r"config\.json and model\.safetensors.*checkpoints/last"):
         export_checkpoint(tmp_path, tmp_path / "out")
@@ -100,10 +243,7 @@ def test_a_policy_of_another_type_is_refused(tmp_path):
         export_checkpoint(tmp_path / "act", tmp_path / "out")
 
 
-def test_a_diverged_policy_is_refused(policy, tmp_path):
-    agent = policy()
-    with torch.no_grad():
-        agent.model.action_head.weight[0, 0] = 1e5
-    agent.save_pretrained(tmp_path / "diverged")
+def test_a_diverged_policy_is_refused(checkpoint, tmp_path):
+    change_tensors(lambda tensors: tensors["model.action_head.weight"].fill_(1e5))(checkpoint / WEIGHTS)
     with pytest.raises(ConfigurationError, match=r"action_head\.weight holds values up to 100000"):
-        export_checkpoint(tmp_path / "diverged", tmp_path / "out")
+        export_checkpoint(checkpoint, tmp_path / "out")

@@ -5,6 +5,7 @@ import pytest
 from huggingface_hub import ModelCard
 from lerobot.configs import PreTrainedConfig
 
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
 
 LANDED = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
@@ -26,6 +27,13 @@ def trained(tmp_path):
     (folder / "train_config.json").write_text(json.dumps(SETTINGS))
     (state / "training_step.json").write_text(json.dumps({"step": 4000}))
     return folder
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", "{}", '{"dataset": 3}'])
+def test_damaged_training_settings_are_named(trained, config, text):
+    (trained / "train_config.json").write_text(text)
+    with pytest.raises(ConfigurationError, match=r"train_config\.json .*(cannot be read|damaged|not settings)"):
+        model_card(trained, config(), 1, CardFacts())
 
 
 def missing(card, *rows):
@@ -58,7 +66,11 @@ def test_the_card_counts_the_held_out_episodes_where_it_can(trained, config, dat
     assert missing(card, f"| Held out for validation | {held_out} |") == []
 
 
-NETWORK = ["| Parameters | 2.7 million |", "| Preset | fast |", "| `observation.state` | STATE | (8,) |"]
+NETWORK = [
+    "| Parameters | 2.7 million |",
+    "| Preset | fast, with dim_model=32, dim_feedforward=48, n_encoder_layers=1 |",
+    "| `observation.state` | STATE | (8,) |",
+]
 PLAIN = ["four-channel views; trained", "a fourth channel of the main camera. ", "| Coordinate channels | no |"]
 
 
