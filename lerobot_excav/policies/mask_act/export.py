@@ -1,7 +1,9 @@
 """Checkpoints to hand on: half precision, without what only training needs."""
 
 import copy
+import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import torch
@@ -29,28 +31,36 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Args:
         checkpoint: A `pretrained_model` folder of lerobot-train.
-        out: Folder to write: `config.json`, `model.safetensors`, the processors, `README.md`; it is returned. Files of
-            an earlier export in it are replaced.
+        out: Folder to write, which appears complete: `config.json`, `model.safetensors`, the processors, `README.md`; it
+            is returned.
         facts: What the model card tells beyond what the checkpoint knows.
 
     Raises:
-        ConfigurationError: The folder does not hold a checkpoint of `mask_act`, is the one to write, or holds a
-            weight beyond half precision.
+        ConfigurationError: The folder does not hold a checkpoint of `mask_act`, or holds a weight beyond half
+            precision, or there is something in the place of the one to write.
     """
     require_checkpoint(checkpoint)
-    require(checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder.")
+    place = Path(os.path.realpath(out))
+    is_free = not any(place.iterdir()) if place.is_dir() else not place.exists()
+    require(is_free, f"out={out} exists; choose another folder, or remove it first.")
     policy = MaskACTPolicy.from_pretrained(checkpoint)
     weights = run_time_weights(policy)
     config = copy.copy(policy.config)
     config.use_vae, config.pretrained_path = False, None
     card = model_card(checkpoint, config, parameter_count(policy), facts or CardFacts())
-    out.mkdir(parents=True, exist_ok=True)
-    save_file(weights, out / WEIGHTS, metadata={"format": "pt"})
-    config.save_pretrained(out)
-    for pattern in PROCESSORS:
-        for file in sorted(checkpoint.glob(pattern)):
-            shutil.copyfile(file, out / file.name)
-    card.save(out / CARD)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as temporary:
+        folder = Path(temporary) / place.name
+        folder.mkdir()
+        save_file(weights, folder / WEIGHTS, metadata={"format": "pt"})
+        config.save_pretrained(folder)
+        for pattern in PROCESSORS:
+            for file in sorted(checkpoint.glob(pattern)):
+                shutil.copyfile(file, folder / file.name)
+        card.save(folder / CARD)
+        if place.is_dir():
+            place.rmdir()  # it is empty
+        folder.rename(place)
     return out
 
 
