@@ -59,7 +59,11 @@ def _play_rest(
     settings: PlayedScenes, partial: Path, pairs: list[Pair], first: int, workers: int, *, show: bool
 ) -> None:
     """Play the pairs from `first` on and append their lines."""
-    with _append_to(partial) as append, worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show) as progress:
+    with (
+        _append_to(partial) as append,
+        worker_pool(workers) as pool,
+        EpisodeProgress(len(pairs), show=show) as progress,
+    ):
         for _ in range(first):
             progress.skip()
         futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]

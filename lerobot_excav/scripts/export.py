@@ -51,7 +51,7 @@ def run(arguments: ExportArguments) -> int:
     facts = CardFacts(
         title=arguments.title,
         env_type=arguments.env,
-        results=arguments.results.read_text() if arguments.results is not None else "",
+        results=arguments.results.read_text(encoding="utf-8") if arguments.results is not None else "",
         license=arguments.license,
     )
     export_checkpoint(checkpoint, out, facts)

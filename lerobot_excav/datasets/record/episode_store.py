@@ -135,4 +135,3 @@ def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 def _decode(data: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
     pictures = np.split(data, ends[:-1])
     return np.stack([np.asarray(Image.open(io.BytesIO(picture.tobytes()))) for picture in pictures])
-

@@ -107,8 +107,8 @@ class PartialRun:
         if self.folder.is_dir() and all(p.name == LOCK or unfinished(p) == SETTINGS for p in self.folder.iterdir()):
             return False
         raise DatasetError(
-            f"{self.folder} is in the way, and was not made by `lerobot-excav demos`, which leaves its {SETTINGS} there; "
-            "move it elsewhere, or choose another --out"
+            f"{self.folder} is in the way, and was not made by `lerobot-excav demos`, which leaves its {SETTINGS} "
+            "there; move it elsewhere, or choose another --out"
         )
 
     def _match_settings(self) -> None:

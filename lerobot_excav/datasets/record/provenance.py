@@ -53,7 +53,7 @@ def read_provenance(root: Path) -> Provenance:
     """
     path = root / PROVENANCE_PATH
     try:
-        record = json.loads(path.read_text())
+        record = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise DatasetError(
             f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"

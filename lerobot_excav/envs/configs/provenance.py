@@ -5,7 +5,6 @@ import logging
 import shlex
 import subprocess
 import sys
-from collections.abc import Collection
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -32,18 +31,17 @@ def write_provenance(path: Path) -> None:
     """
     record_path = path.with_suffix(".json")
     try:
-        record = _record()
-        if record_path.exists() and not _is_record(record_path, record.keys()):
+        if record_path.exists() and not _is_record(record_path):
             raise ValueError(f"it holds something else; choose another name than {path.name}")
-        write_whole(record_path, json.dumps(record, indent=1) + "\n")
+        write_whole(record_path, json.dumps(_record(), indent=1) + "\n")
     except (OSError, ValueError) as error:
         logger.warning(f"{record_path} is not written: {error}")
 
 
-def _is_record(path: Path, fields: Collection[str]) -> bool:
+def _is_record(path: Path) -> bool:
     """Return whether a file holds a record of this module."""
     known = json.loads(path.read_text(encoding="utf-8"))
-    return isinstance(known, dict) and known.keys() == set(fields)
+    return isinstance(known, dict) and known.keys() >= {"command", "commit", "modified", "packages", "started"}
 
 
 def _record() -> dict[str, Any]:
@@ -91,7 +89,9 @@ def code_version() -> tuple[str | None, bool]:
 def _git(*arguments: str) -> str:
     """Return git's answer; an empty one where there is no git, or no repository."""
     try:
-        done = subprocess.run(["git", *arguments], cwd=_PACKAGE, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        done = subprocess.run(
+            ["git", *arguments], cwd=_PACKAGE, capture_output=True, encoding="utf-8", errors="replace", check=False
+        )
     except OSError:
         return ""
     return done.stdout.strip() if done.returncode == 0 else ""

@@ -31,8 +31,8 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Args:
         checkpoint: A `pretrained_model` folder of lerobot-train.
-        out: Folder to write, which appears complete: `config.json`, `model.safetensors`, the processors, `README.md`; it
-            is returned.
+        out: Folder to write, which appears when it is complete: `config.json`, `model.safetensors`, the processors,
+            `README.md`; it is returned.
         facts: What the model card tells beyond what the checkpoint knows.
 
     Raises:
