@@ -50,7 +50,7 @@ def _default(field: "dataclasses.Field[Any]") -> str:
 
 if __name__ == "__main__":
     for page in sorted(PAGES.rglob("*.md")):
-        text = page.read_text()
+        text = page.read_text(encoding="utf-8")
         if text != (new := with_tables(text)):
-            page.write_text(new)
+            page.write_text(new, encoding="utf-8")
             print(f"written: {page}")  # noqa: T201

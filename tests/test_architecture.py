@@ -9,8 +9,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "lerobot_excav"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-# Each layer may import itself, what stands before it in its row, and what all share. Policies stand alone; the last of a row
-# may use the other row. `plugin`, the list of what is registered with LeRobot, is imported by LeRobot alone.
+# Each layer may import itself, what stands before it in its row, and what all share. Policies stand alone; the last of
+# a row may use the other row. `plugin`, the list of what is registered with LeRobot, is imported by LeRobot alone.
 LAYERS = [
     [
         *("envs.constants", "envs.plugins", "envs.soil", "envs.machines", "envs.masks", "envs.tasks", "envs", "robots"),
@@ -18,7 +18,7 @@ LAYERS = [
     ],
     ["policies"],
 ]
-SHARED = {"errors", "setting"}
+SHARED = {"errors", "setting", "whole_file"}
 DATASET_LAYERS = ["format", "pairs", "record", "complete", "check"]
 FREE = {"plugin", "scripts.export"}
 
@@ -127,6 +127,32 @@ def test_files_and_functions_stay_short(path):
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
             assert node.end_lineno - node.lineno + 1 <= 60, node.name
+
+
+def lacks_encoding(call):
+    """Return whether a call opens, reads or writes a text without naming its encoding."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    named = {keyword.arg: keyword.value for keyword in call.keywords}
+    if name in ("run", "Popen", "check_output", "getoutput"):
+        return name == "getoutput" or ("encoding" not in named and bool({"text", "universal_newlines"} & set(named)))
+    if name in ("read_text", "write_text"):
+        return "encoding" not in named
+    if name not in ("open", "NamedTemporaryFile", "fdopen") or ast.unparse(call.func) in (
+        "Image.open",
+        "av.open",
+        "os.open",
+    ):
+        return False
+    is_path = isinstance(call.func, ast.Attribute) and name == "open"
+    mode = named.get("mode") or next(iter(call.args[not is_path :]), None)
+    return "encoding" not in named and not (isinstance(mode, ast.Constant) and "b" in str(mode.value))
+
+
+@pytest.mark.parametrize("folder", ["lerobot_excav", "validation", "bench", "docs", "examples", "workflows"])
+def test_texts_name_their_encoding_since_that_of_the_machine_may_lack_characters(folder):
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            assert not (isinstance(node, ast.Call) and lacks_encoding(node)), f"{path}:{node.lineno}"
 
 
 def test_soil_knows_nothing_of_mujoco():

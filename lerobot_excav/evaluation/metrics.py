@@ -1,6 +1,7 @@
 """What was measured in an evaluation: one line of JSON per episode, as `--env.metrics_path` writes it."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +42,7 @@ class _LineHead(BaseModel):
     model_config = ConfigDict(strict=True)
 
     task: str
+    evaluation: str | None = None
     episode_ix: int | None = None
     operator: str | None = None
     seed: int | None = None
@@ -60,10 +62,10 @@ def read_evaluation(path: Path) -> Evaluation:
 
     Raises:
         DatasetError: The file is missing, empty or damaged, a field is missing or of another type, a task is unknown
-            or tasks are mixed, or an episode occurs twice.
+            or tasks are mixed, an episode occurs twice, or evaluations wrote into the file at the same time.
     """
     path = path / "metrics.jsonl" if path.is_dir() else path
-    evaluations = _cut(_lines(path))
+    evaluations = _cut(_lines(path), path)
     last = evaluations[-1]
     head = last[0].head
     measures = _measures(last)
@@ -80,7 +82,9 @@ def read_evaluation(path: Path) -> Evaluation:
 
 def _lines(path: Path) -> list[_Line]:
     try:
-        texts = path.read_text().splitlines()
+        texts = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise DatasetError(f"{path} is not a metrics file: {error}") from error
     except FileNotFoundError:
         raise DatasetError(f"{path} does not exist; lerobot-eval writes it with --env.metrics_path={path}") from None
     places = [(f"{path}:{number}", text) for number, text in enumerate(texts, 1) if text.strip()]
@@ -89,10 +93,28 @@ def _lines(path: Path) -> list[_Line]:
     return [_Line(place, text, validated(_LineHead, text, place)) for place, text in places]
 
 
-def _cut(lines: list[_Line]) -> list[list[_Line]]:
-    """Cut a file where LeRobot began to count from 0 again."""
-    starts = [i for i, line in enumerate(lines) if i == 0 or line.head.episode_ix == 0]
-    return [lines[a:b] for a, b in zip(starts, [*starts[1:], len(lines)], strict=True)]
+def _cut(lines: list[_Line], path: Path) -> list[list[_Line]]:
+    """Cut a file where another evaluation begins: its lines are named otherwise, or LeRobot counts from 0 again.
+
+    Raises:
+        DatasetError: The lines of an evaluation do not stand together, or not in order.
+    """
+    heads = [line.head for line in lines]
+    changes = [i for i in range(1, len(lines)) if heads[i].evaluation != heads[i - 1].evaluation]
+    starts = sorted({0, *changes, *(i for i, head in enumerate(heads) if head.episode_ix == 0)})
+    parts = [lines[a:b] for a, b in zip(starts, [*starts[1:], len(lines)], strict=True)]
+    seen: set[str] = set()
+    for part in parts:
+        name = part[0].head.evaluation
+        numbers = [line.head.episode_ix for line in part if line.head.episode_ix is not None]
+        if name in seen or any(a >= b for a, b in pairwise(numbers)):
+            key = f'"evaluation": "{name}"'
+            raise DatasetError(
+                f"{part[0].place}: evaluations wrote into {path} at the same time; give each a metrics_path of its own"
+                + (f". To have the lines of this one: grep '{key}' {path} > OTHER.jsonl" if name else "")
+            )
+        seen |= {name} if name else set()
+    return parts
 
 
 def _measures(lines: list[_Line]) -> TaskMeasures:

@@ -1,17 +1,21 @@
 """Evaluating the scripted operator, as lerobot-eval evaluates a policy: same scenes, same file."""
 
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.datasets.record.progress import EpisodeProgress
+from lerobot_excav.datasets.record.run_lock import RunLock
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
 from lerobot_excav.envs.configs.provenance import write_provenance
 from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.whole_file import named, write_whole
 
 
 def evaluate_operator(
@@ -22,36 +26,64 @@ def evaluate_operator(
     Until it is complete the file is called `PATH.partial`; its lines are in the order of the settings.
 
     Raises:
-        DatasetError: The file exists, or an interrupted run is in the way.
+        DatasetError: The file exists, an interrupted run is in the way, something else lies in its place, or another
+            process is at it.
         ConfigurationError: The interrupted run has other settings.
         ExcavError: An episode could not be played.
     """
+    _require_free(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    lock = RunLock(path.with_name(f".{path.name}.lock"), partial)
+    try:
+        if partial.exists() and not resume:
+            raise DatasetError(f"{partial} is an interrupted run; continue it with --resume=true, or remove the file")
+        pairs = settings.pairs()
+        lines = _finished_lines(partial, settings, pairs)
+        # Rewritten whole, so that a line torn by the interruption is gone.
+        write_whole(partial, "".join(lines))
+        _play_rest(settings, partial, pairs, len(lines), workers, show=show_progress)
+        _require_free(path)
+        partial.rename(path)
+    finally:
+        lock.release()
+    write_provenance(path)
+
+
+def _require_free(path: Path) -> None:
     if path.exists():
         raise DatasetError(f"--metrics={path} exists; choose another file, or remove it first")
-    partial = path.with_name(f"{path.name}.partial")
-    if partial.exists() and not resume:
-        raise DatasetError(f"{partial} is an interrupted run; continue it with --resume=true, or remove the file")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pairs = settings.pairs()
-    lines = _finished_lines(partial, settings, pairs)
-    # Rewritten whole, so that a line torn by the interruption is gone.
-    partial.write_text("".join(f"{line}\n" for line in lines))
-    _play_rest(settings, partial, pairs, len(lines), workers, show=show_progress)
-    partial.rename(path)
-    write_provenance(path)
 
 
 def _play_rest(
     settings: PlayedScenes, partial: Path, pairs: list[Pair], first: int, workers: int, *, show: bool
 ) -> None:
     """Play the pairs from `first` on and append their lines."""
-    with partial.open("a") as file, worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show) as progress:
+    with (
+        _append_to(partial) as append,
+        worker_pool(workers) as pool,
+        EpisodeProgress(len(pairs), show=show) as progress,
+    ):
         for _ in range(first):
             progress.skip()
         futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]
         for number, future in enumerate(futures, first):
-            file.write(json_line({"episode_ix": number, **episode_result(pairs[number], future)["line"]}))
-            file.flush()
+            append(json_line({"episode_ix": number, **episode_result(pairs[number], future)["line"]}))
+
+
+@contextmanager
+def _append_to(path: Path) -> Iterator[Callable[[str], None]]:
+    """Provide a function that appends text at once; its errors name the file."""
+    with path.open("a", encoding="utf-8") as file:
+
+        def append(text: str) -> None:
+            try:
+                file.write(text)
+                file.flush()
+            except OSError as error:
+                raise named(error, path) from error
+
+        yield append
 
 
 def play_for_metrics(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
@@ -79,16 +111,40 @@ def _expected(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
 
 
 def _finished_lines(partial: Path, settings: PlayedScenes, pairs: list[Pair]) -> list[str]:
-    """Return the whole lines of an interrupted run, after checking that they belong to these settings."""
+    """Return the whole lines of an interrupted run, after checking that all that lies there is of these settings."""
     if not partial.exists():
         return []
-    lines = [line for line in partial.read_text().splitlines(keepends=True) if line.endswith("\n")]
-    for line, pair in zip(lines, pairs, strict=False):
+    *whole, torn = partial.read_text(encoding="utf-8", errors="replace").split("\n")
+    if len(whole) > len(pairs):
+        raise ConfigurationError(
+            f"{partial} holds {len(whole)} episodes, and {len(pairs)} are asked for; "
+            "continue it with the same options, or remove the file"
+        )
+    for line, pair in zip(whole, pairs, strict=False):
+        _require_line(line, partial, _expected(settings, pair))
+    head = json_line({"episode_ix": len(whole), **_operator(settings)}).rstrip("}\n")
+    if not (torn.startswith(head) or head.startswith(torn)):
+        raise _not_ours(partial)
+    return [f"{line}\n" for line in whole]
+
+
+def _require_line(line: str, partial: Path, expected: dict[str, Any]) -> None:
+    try:
         record = json.loads(line)
-        for name, value in _expected(settings, pair).items():
-            if record.get(name) != value:
-                raise ConfigurationError(
-                    f"{partial} was started with {name}={record.get(name)!r}, not {value!r}; "
-                    "continue it with the same options, or remove the file"
-                )
-    return [line.rstrip("\n") for line in lines[: len(pairs)]]
+    except ValueError as error:
+        raise _not_ours(partial) from error
+    if not isinstance(record, dict) or "operator_seed" not in record:
+        raise _not_ours(partial)
+    for name, value in expected.items():
+        if record.get(name) != value:
+            raise ConfigurationError(
+                f"{partial} was started with {name}={record.get(name)!r}, not {value!r}; "
+                "continue it with the same options, or remove the file"
+            )
+
+
+def _not_ours(partial: Path) -> DatasetError:
+    return DatasetError(
+        f"{partial} holds something else than the lines of `lerobot-excav operator`; move it elsewhere, "
+        "or choose another --metrics"
+    )

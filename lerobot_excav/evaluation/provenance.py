@@ -37,7 +37,7 @@ class EvaluationOrigin(BaseModel):
         path = metrics.with_suffix(".json")
         if not path.is_file():
             return cls(command=None)
-        origin = validated(cls, path.read_text(), str(path))
+        origin = validated(cls, path.read_text(encoding="utf-8"), str(path))
         if origin.training is None and origin.policy is not None:
             return origin.model_copy(update={"training": read_training(Path(origin.policy))})
         return origin

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from lerobot_excav.evaluation.comparison import Difference, compare, difference_of_worlds, require_same_task
+from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, measured
+from lerobot_excav.whole_file import write_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +74,11 @@ def file_notes(run: Run) -> list[str]:
 
 
 def write_report(report: Report, markdown: str, folder: Path) -> None:
-    """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "report.md").write_text(markdown)
-    (folder / "report.json").write_text(json.dumps(report.as_dict(), indent=1) + "\n")
+    """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made.
+
+    Raises:
+        DatasetError: A file of that name was not written by a report, or was changed since.
+    """
+    with ReportFolder(folder).staged() as stage:
+        write_whole(stage / "report.md", markdown)
+        write_whole(stage / "report.json", json.dumps(report.as_dict(), indent=1) + "\n")

@@ -85,7 +85,7 @@ def read_training(pretrained: Path) -> TrainingFacts | None:
 
 
 def _read[Model: BaseModel](model: type[Model], path: Path) -> Model | None:
-    return validated(model, path.read_text(), str(path)) if path.is_file() else None
+    return validated(model, path.read_text(encoding="utf-8"), str(path)) if path.is_file() else None
 
 
 def _demonstrations(dataset: _Dataset) -> int | None:

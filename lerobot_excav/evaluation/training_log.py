@@ -29,7 +29,7 @@ def read_training_log(log: Path) -> TrainingLog:
     """Read what the runs of a training printed, one after the other; a missing file tells nothing."""
     if not log.is_file():
         return TrainingLog()
-    text = log.read_text(errors="replace")
+    text = log.read_text(encoding="utf-8", errors="replace")
     command, commit = _COMMAND.search(text), _COMMIT.search(text)
     return TrainingLog(
         command=command[1] if command else None, commit=commit[1] if commit else None, minutes=_minutes(text)

@@ -8,6 +8,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.whole_file import whole_file
+
 Image = NDArray[np.uint8]
 
 
@@ -21,8 +23,7 @@ def write_video(path: Path, frames: Iterable[Image], fps: int, *, crf: int) -> N
         crf: Constant rate factor of x264: 18 is lossless to the eye, 28 coarse.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    with av.open(str(partial), mode="w", format="mp4") as container:
+    with whole_file(path) as temporary, av.open(str(temporary), mode="w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps))
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": str(crf), "preset": "slow"}
@@ -32,4 +33,3 @@ def write_video(path: Path, frames: Iterable[Image], fps: int, *, crf: int) -> N
             even = np.ascontiguousarray(image[:height, :width])
             container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
         container.mux(stream.encode(None))
-    partial.replace(path)

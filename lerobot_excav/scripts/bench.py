@@ -18,9 +18,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
+from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import EnvironmentChoice
 from lerobot_excav.scripts.demos import WorkArguments, played
 from lerobot_excav.setting import setting, with_default
+from lerobot_excav.whole_file import write_whole
 
 MEASURES = ("environment", "writing", "demos")
 
@@ -42,6 +44,8 @@ def run(arguments: BenchArguments) -> int:
     """Measure, and print what was measured."""
     from lerobot_excav.evaluation.speed import measures
 
+    if arguments.json is not None:
+        require(not arguments.json.exists(), f"--json={arguments.json} exists; choose another file, or remove it first")
     settings = DemonstrationSettings(keep_failures=True, **vars(played(PlayedScenes, arguments)))
     tasks = measures(settings, workers=arguments.workers)
     machine = {"machine": platform.machine(), "cores": os.cpu_count(), "load": os.getloadavg()[0]}
@@ -53,7 +57,7 @@ def run(arguments: BenchArguments) -> int:
             results.append(result._asdict())
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(json.dumps({**machine, "measurements": results}, indent=1) + "\n")
+        write_whole(arguments.json, json.dumps({**machine, "measurements": results}, indent=1) + "\n")
     return 0
 
 

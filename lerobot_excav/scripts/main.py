@@ -2,11 +2,13 @@
 
 import argparse
 import importlib
+import io
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
 from lerobot_excav.errors import ExcavError
+from lerobot_excav.scripts.file_trouble import in_words
 
 COMMANDS = {
     "demos": "record demonstrations with the scripted operator, faster than real time",
@@ -44,6 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, 1 if a check failed, 2 after an error of usage or data, 130 after Ctrl-C.
     """
+    _print_anything()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments[:1] == ["--version"]:
         print(f"lerobot-excav {version('lerobot_env_excav')}")
@@ -66,12 +69,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except OSError as error:
         # A folder in place of a file, no permission, a full disk: nothing a traceback would explain.
-        place = f"{error.filename}: " if error.filename is not None else ""
-        print(f"lerobot-excav {name}: {place}{error.strerror or error}", file=sys.stderr)
+        print(f"lerobot-excav {name}: {in_words(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"\nlerobot-excav {name}: interrupted", file=sys.stderr)
         return 130
+
+
+def _print_anything() -> None:
+    """Let a terminal that lacks a character show a question mark in its place, rather than end the program."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _overview() -> argparse.ArgumentParser:

@@ -26,7 +26,7 @@ def write_report(outcomes: list[Outcome], conditions: Conditions, path: Path) ->
     for _, result in outcomes:
         for plot in result.plots:
             draw(plot, images / f"{plot.name}.png")
-    path.write_text(report_text(outcomes, conditions))
+    path.write_text(report_text(outcomes, conditions), encoding="utf-8")
 
 
 def report_text(outcomes: list[Outcome], conditions: Conditions) -> str:

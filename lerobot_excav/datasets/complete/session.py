@@ -66,7 +66,7 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
             has an environment, a setting, a scene or a target that is not possible. The message names line and field.
     """
     try:
-        lines = path.read_text().splitlines()
+        lines = path.read_text(encoding="utf-8").splitlines()
     except FileNotFoundError:
         raise DatasetError(f"{path} does not exist; the robot wrote its session to --robot.session_log") from None
     episodes = [_episode(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]

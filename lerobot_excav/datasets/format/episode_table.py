@@ -181,7 +181,7 @@ def read_info(root: Path) -> DatasetInfo:
         DatasetError: There is no dataset, or it has another format.
     """
     try:
-        info = json.loads((root / "meta" / "info.json").read_text())
+        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json") from None
     if info["codebase_version"] != CODEBASE_VERSION:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.whole_file import whole_file
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
 
@@ -53,10 +54,8 @@ def write_index(root: Path) -> pd.DataFrame:
 
 def store_index(root: Path, index: pd.DataFrame) -> None:
     """Write an index beside its dataset; readers see the old one or the new one, never half of one."""
-    path = root / INDEX_PATH
-    temporary = path.with_suffix(".tmp")
-    index.to_parquet(temporary, index=False)
-    temporary.replace(path)
+    with whole_file(root / INDEX_PATH) as temporary:
+        index.to_parquet(temporary, index=False)
 
 
 def _row(episode: EpisodeTable) -> dict[str, Any]:

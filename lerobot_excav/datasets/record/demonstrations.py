@@ -70,11 +70,12 @@ def record_demonstrations(
     start = time.monotonic()
     if out.exists():
         outcomes = _require_finished(out, settings, resume=resume)
+        PartialRun.clear_finished(out, settings)
     else:
         with PartialRun(out, settings, resume=resume) as partial:
             outcomes = _fill(partial, settings, workers=workers, show_progress=show_progress)
             partial.dataset.rename(out)
-    PartialRun.remove(out)
+            partial.clear()
     return DemonstrationSummary(
         out=out,
         episodes=sum(outcome["kept"] for outcome in outcomes),

@@ -1,12 +1,15 @@
 """Finished episodes on disk, one by one, until a dataset is assembled from them.
 
-An episode is two files: `NAME.npz` with the frames (only if it is kept) and `NAME.json` with its outcome. Both are
-written under another name and renamed, the outcome last, so an outcome on disk means that the episode is complete.
+An episode is two files: `NAME.npz` with the frames (only if it is kept) and `NAME.json` with its outcome. Both appear
+whole, the outcome last, so an outcome on disk means that the episode is complete.
 """
 
 import io
 import json
-import os
+import zipfile
+import zlib
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,8 @@ from PIL import Image
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.episode import Episode
+from lerobot_excav.errors import DatasetError
+from lerobot_excav.whole_file import unfinished, write_whole
 
 # Only a stopover: LeRobot compresses again, so speed counts here (level 1 takes a third of level 6's time).
 PNG_LEVEL = 1
@@ -44,22 +49,41 @@ class EpisodeStore:
         if keep_frames:
             buffer = io.BytesIO()
             np.savez(buffer, allow_pickle=False, **_arrays(episode))
-            _replace(self._path(episode.pair, "npz"), buffer.getbuffer())
-        _replace(self._path(episode.pair, "json"), json.dumps(outcome).encode())
+            write_whole(self._path(episode.pair, "npz"), buffer.getbuffer())
+        write_whole(self._path(episode.pair, "json"), json.dumps(outcome))
         return outcome
 
     def outcome(self, pair: Pair) -> dict[str, Any] | None:
-        """Return the outcome of an episode, or None if it is not finished."""
+        """Return the outcome of an episode, or None if it is not finished.
+
+        Raises:
+            DatasetError: The file is damaged.
+        """
+        path = self._path(pair, "json")
         try:
-            return dict(json.loads(self._path(pair, "json").read_text()))
+            outcome = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
+        except ValueError as error:
+            raise _damaged(path) from error
+        if not isinstance(outcome, dict) or outcome.get("pair_uid") != pair.uid:
+            raise _damaged(path)
+        return outcome
 
     def read(self, pair: Pair) -> Episode:
-        """Read a finished episode whose frames were kept."""
-        outcome = json.loads(self._path(pair, "json").read_text())
-        with np.load(self._path(pair, "npz")) as stored:
-            arrays = {key: stored[key] for key in stored.files}
+        """Read a finished episode whose frames were kept.
+
+        Raises:
+            DatasetError: The file of the frames is damaged or missing.
+        """
+        outcome = self.outcome(pair)
+        assert outcome is not None
+        path = self._path(pair, "npz")
+        try:
+            with np.load(path) as stored:
+                arrays = {key: stored[key] for key in stored.files}
+        except (FileNotFoundError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+            raise _damaged(path) from error
         cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
         return Episode(
             pair=pair,
@@ -71,8 +95,24 @@ class EpisodeStore:
             metrics=outcome["metrics"],
         )
 
+    def remove(self, pairs: Iterable[Pair]) -> None:
+        """Remove the files of episodes, and the folder unless it holds something else."""
+        names = {self._path(pair, suffix).name for pair in pairs for suffix in ("npz", "json")}
+        for path in self._folder.iterdir():
+            if path.name in names or unfinished(path) in names:
+                path.unlink()
+        with suppress(OSError):
+            self._folder.rmdir()
+
     def _path(self, pair: Pair, suffix: str) -> Path:
         return self._folder / f"{pair.uid.replace('/', '-')}.{suffix}"
+
+
+def _damaged(path: Path) -> DatasetError:
+    return DatasetError(
+        f"{path} is missing or damaged; remove {path.with_suffix('.json')}, and go on with --resume=true: "
+        "the episode is played again"
+    )
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
@@ -95,13 +135,3 @@ def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 def _decode(data: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
     pictures = np.split(data, ends[:-1])
     return np.stack([np.asarray(Image.open(io.BytesIO(picture.tobytes()))) for picture in pictures])
-
-
-def _replace(path: Path, data: bytes | memoryview) -> None:
-    """Write a file so that it is either absent or whole, even if the machine stops."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    with temporary.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)

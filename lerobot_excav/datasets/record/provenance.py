@@ -13,6 +13,7 @@ from typing import Any
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.errors import DatasetError
+from lerobot_excav.whole_file import write_whole
 
 PROVENANCE_PATH = Path("meta/excav_demonstrations.json")
 
@@ -40,7 +41,7 @@ def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list
             {**outcome, "seed": settings.episode_seed(Pair.parse(outcome["pair_uid"]))} for outcome in outcomes
         ],
     }
-    (root / PROVENANCE_PATH).write_text(json.dumps(record, indent=1) + "\n")
+    write_whole(root / PROVENANCE_PATH, json.dumps(record, indent=1) + "\n")
 
 
 def read_provenance(root: Path) -> Provenance:
@@ -52,7 +53,7 @@ def read_provenance(root: Path) -> Provenance:
     """
     path = root / PROVENANCE_PATH
     try:
-        record = json.loads(path.read_text())
+        record = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise DatasetError(
             f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"

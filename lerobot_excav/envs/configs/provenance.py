@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import lerobot_excav
+from lerobot_excav.whole_file import write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -30,13 +31,17 @@ def write_provenance(path: Path) -> None:
     """
     record_path = path.with_suffix(".json")
     try:
-        if record_path.exists() and "packages" not in json.loads(record_path.read_text()):
-            raise OSError(f"it holds something else; choose another name than {path.name}")
-        partial = record_path.with_name(f"{record_path.name}.partial")
-        partial.write_text(json.dumps(_record(), indent=1) + "\n")
-        partial.replace(record_path)
+        if record_path.exists() and not _is_record(record_path):
+            raise ValueError(f"it holds something else; choose another name than {path.name}")
+        write_whole(record_path, json.dumps(_record(), indent=1) + "\n")
     except (OSError, ValueError) as error:
         logger.warning(f"{record_path} is not written: {error}")
+
+
+def _is_record(path: Path) -> bool:
+    """Return whether a file holds a record of this module."""
+    known = json.loads(path.read_text(encoding="utf-8"))
+    return isinstance(known, dict) and known.keys() >= {"command", "commit", "modified", "packages", "started"}
 
 
 def _record() -> dict[str, Any]:
@@ -84,7 +89,9 @@ def code_version() -> tuple[str | None, bool]:
 def _git(*arguments: str) -> str:
     """Return git's answer; an empty one where there is no git, or no repository."""
     try:
-        done = subprocess.run(["git", *arguments], cwd=_PACKAGE, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ["git", *arguments], cwd=_PACKAGE, capture_output=True, encoding="utf-8", errors="replace", check=False
+        )
     except OSError:
         return ""
     return done.stdout.strip() if done.returncode == 0 else ""

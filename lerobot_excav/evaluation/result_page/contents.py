@@ -80,6 +80,9 @@ class Contents(_Table):
             raise ValueError(f"{twice} stands on the page twice")
         if twice := sorted({name for name in folders if folders.count(name) > 1}):
             raise ValueError(f"{twice} are the folders of two curves; name each folder once")
+        for name in [*labels, *folders]:
+            if Path(name).name != name or name.startswith("."):
+                raise ValueError(f"{name!r} names a file of the page; it must not be empty, hidden or hold a slash")
         named = [section.reference for section in self.section if section.reference is not None]
         for label in [*named, *(clips.label for clips in self.clips)]:
             if label not in labels:
@@ -99,7 +102,7 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     """
     require(path.is_file(), f"--rows={path} does not exist")
     try:
-        content = tomllib.loads(path.read_text())
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"--rows={path} is not TOML: {error}") from error
     # Dates have no JSON form; as text they are refused where a number is asked for.

@@ -5,12 +5,17 @@ import shutil
 from pathlib import Path
 
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
+from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.result_page.contents import CURVES
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
 from lerobot_excav.evaluation.result_page.video_grid import grid_clips, present_clips, write_grid
 from lerobot_excav.evaluation.run import Run
+from lerobot_excav.whole_file import write_whole
+
+METRICS = "metrics"
+TEXTS = ("report.md", "report.json", "rows.jsonl")
 
 
 def write_page(page: ResultPage, folder: Path) -> list[Path]:
@@ -20,49 +25,43 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     with `metrics/LABEL.json`, where it comes from. A page can be made again from these copies; those of an earlier page
     are removed. A plot or video that could not be made again, because checkpoints or videos are gone, stays.
     Returns what was written, but for the copies.
+
+    Raises:
+        DatasetError: A file that no page has written, or that was changed since, lies in the place of one.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    _keep_metrics(page, folder / "metrics")
-    written = _pictures(page, folder)
-    beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if (folder / name).exists()]
-    texts = {
-        "report.md": page_text(page, files=beside, clips=present_clips(page) or None),
-        "report.json": json.dumps(page.as_dict(), indent=1) + "\n",
-        "rows.jsonl": "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows),
-    }
-    for name, text in texts.items():
-        (folder / name).write_text(text)
-    return [*(folder / name for name in texts), *written]
+    report = ReportFolder(folder)
+    report.require_free(TEXTS)
+    with report.staged() as stage:
+        copies = _keep_metrics(page, stage / METRICS, folder / METRICS)
+        pictures = _pictures(page, stage)
+        beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if name in pictures or name in report.own]
+        text = page_text(page, files=beside, clips=present_clips(page) or None)
+        rows = "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows)
+        for name, content in zip(TEXTS, (text, json.dumps(page.as_dict(), indent=1) + "\n", rows), strict=True):
+            write_whole(stage / name, content)
+    if Path(page.contents.metrics).resolve() != (folder / METRICS).resolve():  # not made of the copies themselves
+        report.remove(lambda name: name.startswith(f"{METRICS}/") and name not in copies)
+    return [folder / name for name in (*TEXTS, *pictures)]
 
 
-def _keep_metrics(page: ResultPage, folder: Path) -> None:
-    """Copy what the page is made of, and remove what an earlier one was: a page made of the copies must be the same."""
-    copies = [_copy_metrics(row.run, folder / f"{row.row.label}.jsonl", row.origin) for row in page.rows]
+def _keep_metrics(page: ResultPage, stage: Path, folder: Path) -> set[str]:
+    """Copy what the page is made of; return the names of the copies, seen from the page."""
+    kept: list[tuple[str, Run, EvaluationOrigin]] = [(row.row.label, row.run, row.origin) for row in page.rows]
     for curve in page.curves:
-        for point in curve.points:
-            copy = folder / CURVES / curve.name / f"{point.step:06d}.jsonl"
-            copies.append(_copy_metrics(point.run, copy, point.origin))
-    if Path(page.contents.metrics).resolve() == folder.resolve():
-        return  # made of the copies themselves
-    for kept in [*folder.glob("*.jsonl"), *folder.glob(f"{CURVES}/*/*.jsonl")]:
-        # Only a page's own copies tell beside them where they come from.
-        if kept not in copies and (origin := kept.with_suffix(".json")).exists():
-            kept.unlink()
-            origin.unlink()
+        kept += [(f"{CURVES}/{curve.name}/{point.step:06d}", point.run, point.origin) for point in curve.points]
+    for name, run, origin in kept:
+        if run.first.path.resolve() != (folder / f"{name}.jsonl").resolve():
+            copy = stage / f"{name}.jsonl"
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(run.first.path, copy)
+            write_whole(stage / f"{name}.json", origin.model_dump_json(indent=1) + "\n")
+    return {f"{METRICS}/{name}.{suffix}" for name, *_ in kept for suffix in ("jsonl", "json")}
 
 
-def _copy_metrics(run: Run, copy: Path, origin: EvaluationOrigin) -> Path:
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    if run.first.path.resolve() != copy.resolve():
-        shutil.copyfile(run.first.path, copy)
-    copy.with_suffix(".json").write_text(origin.model_dump_json(indent=1) + "\n")
-    return copy
-
-
-def _pictures(page: ResultPage, folder: Path) -> list[Path]:
+def _pictures(page: ResultPage, folder: Path) -> list[str]:
     clips = grid_clips(page)
     if page.curves:
         plot_curves(page.curves, folder / CURVE_PLOT)
     if clips:
         write_grid(folder / VIDEO_GRID, clips)
-    return [folder / name for name, shown in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if shown]
+    return [name for name, shown in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if shown]

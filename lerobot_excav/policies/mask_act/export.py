@@ -1,7 +1,9 @@
 """Checkpoints to hand on: half precision, without what only training needs."""
 
 import copy
+import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import torch
@@ -13,7 +15,7 @@ from torch import Tensor
 from lerobot_excav.errors import ConfigurationError, require
 from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, read_json, require_processors
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
-from lerobot_excav.policies.mask_act.model_card import TRAINING_CONFIG, CardFacts, model_card
+from lerobot_excav.policies.mask_act.model_card import CardFacts, model_card
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
@@ -30,30 +32,37 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
 
     Args:
         checkpoint: A `pretrained_model` folder of lerobot-train.
-        out: Folder to write: `config.json`, `model.safetensors`, the processors, `README.md`; it is returned. Files of
-            an earlier export in it are replaced; any other folder must be empty.
+        out: Folder to write, which appears when it is complete: `config.json`, `model.safetensors`, the processors,
+            `README.md`; it is returned.
         facts: What the model card tells beyond what the checkpoint knows.
 
     Raises:
-        ConfigurationError: The folder does not hold a whole checkpoint of `mask_act`, holds a weight beyond half
-            precision, or is the one to write, or that one holds something else.
+        ConfigurationError: The folder does not hold a whole checkpoint of `mask_act`, or holds a weight beyond half
+            precision, or there is something in the place of the one to write.
     """
     config = read_config(checkpoint)
-    require(checkpoint.resolve() != out.resolve(), f"out={out} is the checkpoint itself; choose another folder.")
-    _require_own(out)
+    place = Path(os.path.realpath(out))
+    is_free = not any(place.iterdir()) if place.is_dir() else not place.exists()
+    require(is_free, f"out={out} exists; choose another folder, or remove it first.")
     require_processors(checkpoint)
     policy = MaskACTPolicy.from_pretrained(checkpoint, config=config)
     weights = run_time_weights(policy)
     config = copy.copy(policy.config)
     config.use_vae, config.pretrained_path = False, None
     card = model_card(checkpoint, config, parameter_count(policy), facts or CardFacts())
-    out.mkdir(parents=True, exist_ok=True)
-    save_file(weights, out / WEIGHTS, metadata={"format": "pt"})
-    config.save_pretrained(out)
-    for name in PROCESSORS:
-        for file in sorted(checkpoint.glob(f"{Path(name).stem}*")):
-            shutil.copyfile(file, out / file.name)
-    card.save(out / CARD)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as temporary:
+        folder = Path(temporary) / place.name
+        folder.mkdir()
+        save_file(weights, folder / WEIGHTS, metadata={"format": "pt"})
+        config.save_pretrained(folder)
+        for name in PROCESSORS:
+            for file in sorted(checkpoint.glob(f"{Path(name).stem}*")):
+                shutil.copyfile(file, folder / file.name)
+        card.save(folder / CARD)
+        if place.is_dir():
+            place.rmdir()  # it is empty
+        folder.rename(place)
     return out
 
 
@@ -80,17 +89,6 @@ def run_time_weights(policy: MaskACTPolicy) -> dict[str, Tensor]:
 def parameter_count(policy: MaskACTPolicy) -> int:
     """Return the number of parameters that acting needs."""
     return sum(value.numel() for name, value in policy.named_parameters() if not name.startswith(TRAINING_ONLY))
-
-
-def _require_own(out: Path) -> None:
-    """Raise unless a folder is missing, empty, or an earlier export."""
-    names = {path.name for path in out.iterdir()} if out.is_dir() else set()
-    is_export = {CONFIG, WEIGHTS, CARD} <= names and TRAINING_CONFIG not in names
-    require(
-        not names or is_export,
-        f"out={out} holds something else than an earlier export ({', '.join(sorted(names)[:3])}); choose another "
-        "folder, or empty it.",
-    )
 
 
 def read_config(checkpoint: Path) -> MaskACTConfig:

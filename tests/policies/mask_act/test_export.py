@@ -85,22 +85,10 @@ def test_the_card_has_the_facts_and_no_file_names_a_local_path(exported, tmp_pat
         assert str(tmp_path).encode() not in file.read_bytes(), file.name
 
 
-def test_a_second_export_replaces_the_first_but_not_the_checkpoint(checkpoint, exported):
-    before = (exported / WEIGHTS).read_bytes()
-    (exported / WEIGHTS).write_bytes(b"")
-    export_checkpoint(checkpoint, exported)
-    assert (exported / WEIGHTS).read_bytes() == before
-    with pytest.raises(ConfigurationError, match="is the checkpoint itself"):
-        export_checkpoint(checkpoint, checkpoint)
-
-
-def test_a_folder_that_is_not_an_export_is_kept(checkpoint, tmp_path):
-    thesis, training = tmp_path / "thesis", shutil.copytree(checkpoint, tmp_path / "another")
-    thesis.mkdir()
-    for folder in (thesis, training):
-        (folder / "README.md").write_text("mine")
+def test_an_export_stands_in_a_folder_of_its_own(checkpoint, exported):
+    for folder in (exported, checkpoint):
         before = {path.name: path.read_bytes() for path in folder.iterdir()}
-        with pytest.raises(ConfigurationError, match=rf"out={folder} holds something else"):
+        with pytest.raises(ConfigurationError, match=rf"out={folder} exists; choose another"):
             export_checkpoint(checkpoint, folder)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
