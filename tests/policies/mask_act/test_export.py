@@ -1,6 +1,5 @@
 import json
 import re
-import shutil
 from functools import wraps
 
 import pytest
