@@ -5,6 +5,7 @@ The help text goes where draccus, LeRobot's command line parser, looks for it.
 """
 
 import dataclasses
+import math
 import sys
 import typing
 from collections.abc import Callable, Collection, Mapping
@@ -18,6 +19,7 @@ from lerobot_excav.errors import ConfigurationError, shown
 
 _METADATA_KEY = "setting"
 _ENDLESS = 2**31 - 1  # limits from here on are there for files and clocks, and need not be told
+_LARGEST_INTEGER = 2**63 - 1
 _LARGEST_FLOAT = sys.float_info.max
 _KIND_NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false", Path: "a path"}
 
@@ -66,10 +68,10 @@ class Allowed:
         low = f"from {self.low}" if self.low is not None else f"above {self.above}" if self.above is not None else ""
         if self.below is not None:
             return f"{low} to below {self.below}".strip()
-        is_beyond = _is_number(value) and self.high is not None and value > self.high
-        if self.high is None or (self.high >= _ENDLESS and not is_beyond):
-            return f"{low} on" if self.low is not None else low
-        return f"{low} to {self.high}"
+        high = _LARGEST_INTEGER if self.high is None else self.high
+        if high < _ENDLESS or (isinstance(value, Integral) and not _lies(value, -math.inf, high)):
+            return f"{low} to {high}".strip()
+        return f"{low} on" if self.low is not None else low
 
     def is_in_range(self, value: Any) -> bool:
         """Tell whether a value is one of the choices, or a number within the limits."""
@@ -141,10 +143,10 @@ def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:
         return
     if any(_is_of(value, each) for each in kinds) and all(map(allowed.is_in_range, _members(value))):
         return
-    words = allowed.words_for(value)
-    if allowed.values is None or any(typing.get_origin(each) for each in kinds):
-        words = f"{' or '.join(_kind_words(each) for each in kinds if each is not NoneType)} {words}"
-    raise ConfigurationError(f"{name}={shown(value)} is not possible; give {words.strip()}. {allowed.hint}".rstrip())
+    words = dict.fromkeys(_words(each, allowed.words_for(value)) for each in kinds if each is not NoneType)
+    raise ConfigurationError(
+        f"{name}={shown(value)} is not possible; give {' or '.join(words)}. {allowed.hint}".rstrip()
+    )
 
 
 def _alternatives(kind: Any) -> tuple[Any, ...]:
@@ -160,17 +162,24 @@ def _members(value: Any) -> Collection[Any]:
     return value if isinstance(value, list | tuple) else (value,)
 
 
-def _kind_words(kind: Any) -> str:
+def _words(kind: Any, limits: str) -> str:
+    """Say in words what values of a type within limits are."""
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if origin is list:
-        return f"a list, each {_kind_words(parts[0])}"
+        return f"a list, each {_words(parts[0], limits)}"
     if origin is dict:
-        return f"a mapping of names, each to {_kind_words(parts[1])}"
-    return str(_KIND_NAMES.get(kind, getattr(kind, "__name__", kind)))
+        return f"names, each with {_words(parts[1], limits)}"
+    name = _KIND_NAMES.get(kind, getattr(kind, "__name__", kind))
+    return limits if limits.startswith("one of") else f"{name} {limits}".strip()
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _lies(value: Any, low: float, high: float) -> bool:
+    """Tell whether a number lies within limits; what is not a number does not."""
+    return bool(low <= value <= high)
 
 
 def _is_of(value: Any, kind: Any) -> bool:
@@ -184,9 +193,9 @@ def _is_of(value: Any, kind: Any) -> bool:
     if kind is bool or isinstance(value, bool):
         return kind is bool and isinstance(value, bool)
     if kind is int:
-        return isinstance(value, Integral) and -(2**63) <= value < 2**63
+        return isinstance(value, Integral) and _lies(value, -_LARGEST_INTEGER, _LARGEST_INTEGER)
     if kind is float:
-        return isinstance(value, Real) and -_LARGEST_FLOAT <= value <= _LARGEST_FLOAT
+        return isinstance(value, Real) and _lies(value, -_LARGEST_FLOAT, _LARGEST_FLOAT)
     if kind is Path:
         return isinstance(value, str | Path) and str(value) != "" and "\0" not in str(value)
-    return isinstance(value, kind)
+    return isinstance(value, kind) and value != ""

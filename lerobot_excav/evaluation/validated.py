@@ -5,7 +5,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from lerobot_excav.errors import DatasetError, ExcavError
+from lerobot_excav.errors import DatasetError, ExcavError, shown
 
 
 def validated[Model: BaseModel](
@@ -37,7 +37,7 @@ def _reason(error: Mapping[str, Any], model: type[BaseModel]) -> str:
         return f"not JSON ({error['ctx']['error']}); was its writer interrupted? Remove what is incomplete"
     if kind == "value_error":
         return f"{field}: {error['ctx']['error']}" if field else str(error["ctx"]["error"])
-    return f"{field or 'the whole'}={value!r:.60}: {message[0].lower()}{message[1:]}"
+    return f"{field or 'the whole'}={shown(value, most=60)}: {message[0].lower()}{message[1:]}"
 
 
 def _part(model: Any, place: tuple[str | int, ...]) -> Any:

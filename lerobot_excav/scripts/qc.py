@@ -45,7 +45,7 @@ class DatasetArguments(Arguments):
 class QcArguments(DatasetArguments):
     """Arguments of `lerobot-excav qc`."""
 
-    episodes: list[int] | None = setting("Episodes to check, as [0,5,7]; left out: all", default=None)
+    episodes: list[int] | None = setting("Episodes to check, as [0,5,7]; left out: all", default=None, low=0)
     replays: int = setting("How many of them to replay", default=3, low=0)
     seed: int = setting("Seed of the choice of replays", default=0, low=0)
 

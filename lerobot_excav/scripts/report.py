@@ -19,7 +19,7 @@ Examples:
       the same from the copies that a page keeps
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -38,8 +38,7 @@ class ReportArguments(Arguments):
 
     POSITIONAL: ClassVar[str] = "metrics"
 
-    metrics: list[str] = field(default_factory=list)
-    """[LABEL=]FILE or folder, any number"""
+    metrics: list[str] = setting("[LABEL=]FILE or folder, any number", default_factory=list)
     rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
     metrics_folder: Path | None = setting("With --rows: folder of the metrics in place of the file's", default=None)
     operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)

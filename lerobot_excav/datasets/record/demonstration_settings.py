@@ -11,7 +11,7 @@ from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_s
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.errors import ConfigurationError, require, require_choice, shown
 from lerobot_excav.setting import check_settings, declared_settings, setting
 
 MOST_SCENES, MOST_FRAMES = 100_000, 100_000  # more is a slip of the keyboard: it would fill the memory
@@ -47,6 +47,10 @@ class PlayedScenes:
 
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
+        require(
+            isinstance(self.env, TaskSettings),
+            f"env={shown(self.env)} is not the settings of an environment; DemonstrationSettings.of makes them by name",
+        )
         option, spec = f"--target_rule={self.target_rule}", self.task_spec
         require(
             self.targets == 1 or self.target_rule == "round",

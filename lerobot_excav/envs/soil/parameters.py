@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from numbers import Real
+from typing import Any, NamedTuple
 
-from lerobot_excav.errors import require
+from lerobot_excav.errors import require, shown
 
 
 class Origin(NamedTuple):
@@ -35,10 +36,11 @@ class SoilParameters:
 
     def __post_init__(self) -> None:
         for name, origin in ORIGINS.items():
-            value = getattr(self, name)
+            value: Any = getattr(self, name)
+            is_number = isinstance(value, Real) and not isinstance(value, bool)
             require(
-                math.isfinite(value) and origin.low <= value <= origin.high,
-                f"soil {name}={value!r} is out of range; allowed: {origin.low} to {origin.high}.",
+                is_number and origin.low <= value <= origin.high,
+                f"soil {name}={shown(value)} is out of range; allowed: {origin.low} to {origin.high}.",
             )
 
     @property

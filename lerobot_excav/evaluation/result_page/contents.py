@@ -2,16 +2,36 @@
 
 import json
 import os
+import re
 import tomllib
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from lerobot_excav.errors import ConfigurationError, require
 from lerobot_excav.evaluation.validated import validated
 
 CURVES = "curves"
 """Folder of the curves' metrics beside those of the rows, where a page keeps copies."""
+
+
+def _plain_name(name: str) -> str:
+    """Return a name that a file beside others may have: a page writes a copy of its metrics under it."""
+    if not re.fullmatch(r"[^./\\\x00-\x1f][^/\\\x00-\x1f]*", name):
+        raise ValueError(f"{name!r:.60} cannot name a file; leave out slashes and a dot in front")
+    return name
+
+
+def _folder(path: str) -> str:
+    if not path or "\0" in path:
+        raise ValueError(f"{path!r:.60} is not a folder")
+    return path
+
+
+Text = Annotated[str, Field(min_length=1)]
+Name = Annotated[str, AfterValidator(_plain_name)]
+Folder = Annotated[str, AfterValidator(_folder)]
 
 
 class _Table(BaseModel):
@@ -23,15 +43,15 @@ class _Table(BaseModel):
 class Row(_Table):
     """A row: one evaluation."""
 
-    label: str  # name of its metrics
-    about: str  # the policy, in words
+    label: Name  # of its metrics
+    about: Text  # the policy, in words
     paper: dict[str, float] = {}  # the paper's figures by key of their column, rates in percent
 
 
 class Section(_Table):
     """A table of rows."""
 
-    title: str
+    title: Text
     rows: tuple[Row, ...] = ()
     text: str = ""  # what is to be known before
     reference: str | None = None  # label of the row, here or elsewhere, that the others are compared with
@@ -40,22 +60,22 @@ class Section(_Table):
 class CurveSource(_Table):
     """Evaluations of the checkpoints of one training."""
 
-    label: str  # in the plot
-    folder: str  # holds an evaluation per checkpoint, named by its step
+    label: Text  # in the plot
+    folder: Folder  # holds an evaluation per checkpoint, named by its step
 
 
 class Clips(_Table):
     """Episodes of one evaluation, side by side in the video grid."""
 
-    label: str  # name of its metrics
-    episodes: tuple[int, ...]
+    label: Name  # of its metrics
+    episodes: tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...]
 
 
 class Contents(_Table):
     """Everything on the page."""
 
-    title: str
-    metrics: str  # folder of the metrics files
+    title: Text
+    metrics: Folder  # of the metrics files
     section: tuple[Section, ...] = ()
     text: str = ""  # what is to be known before
     curve: tuple[CurveSource, ...] = ()  # success against training
@@ -76,6 +96,8 @@ class Contents(_Table):
         labels = [row.label for row in self.rows]
         # A page keeps the metrics of a curve by the name of its folder.
         folders = [Path(curve.folder).name for curve in self.curve]
+        for folder in folders:
+            _plain_name(folder)
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
             raise ValueError(f"{twice} stands on the page twice")
         if twice := sorted({name for name in folders if folders.count(name) > 1}):
@@ -103,7 +125,8 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     require(path.is_file(), f"--rows={path} does not exist")
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+    # Damaged, not text, or a number of thousands of digits.
+    except (ValueError, RecursionError) as error:
         raise ConfigurationError(f"--rows={path} is not TOML: {error}") from error
     # Dates have no JSON form; as text they are refused where a number is asked for.
     text = json.dumps(content, default=str)

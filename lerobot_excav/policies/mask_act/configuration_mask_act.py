@@ -5,13 +5,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from lerobot.configs import PreTrainedConfig
+from lerobot.configs import NormalizationMode, PreTrainedConfig
 from lerobot.optim import AdamWConfig, LRSchedulerConfig
 from lerobot.optim.schedulers import ConstantWithWarmupSchedulerConfig, CosineAnnealingWithWarmupSchedulerConfig
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
-from lerobot_excav.policies.mask_act.features import check_features, normalization
+from lerobot_excav.policies.mask_act.features import NORMALISED, check_features, check_normalization
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
 from lerobot_excav.setting import check_settings, setting
@@ -129,7 +129,11 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         "Steps over which the learning rate rises from zero", default=None, low=0, high=2**31 - 1
     )
 
-    # LeRobot's own, for every policy.
+    # LeRobot's own, for every policy; its features are checked as well.
+    normalization_mapping: dict[str, NormalizationMode] = setting(
+        "How each kind of feature is normalised",
+        default_factory=lambda: dict.fromkeys(NORMALISED, NormalizationMode.MEAN_STD),
+    )
     device: str | None = setting("cpu, cuda, cuda:0, mps or xpu; left out: the fastest there is", default=None)
     use_amp: bool = setting("Compute in mixed precision", default=False)
     use_peft: bool = setting("Whether an adapter of PEFT was trained", default=False)
@@ -165,7 +169,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         )
         check_features("policy.input_features", self.input_features)
         check_features("policy.output_features", self.output_features)
-        self.normalization_mapping = normalization("policy.normalization_mapping", self.normalization_mapping)
+        check_normalization("policy.normalization_mapping", self.normalization_mapping)
 
     def _apply_rules(self) -> None:
         if self.n_action_steps is None:

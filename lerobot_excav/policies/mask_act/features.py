@@ -8,7 +8,9 @@ from lerobot.utils.constants import ACTION, OBS_STATE
 
 from lerobot_excav.errors import require, shown
 
-NORMALISED = (FeatureType.VISUAL, FeatureType.STATE, FeatureType.ACTION)  # kinds whose normalisation has to be told
+NORMALISED = tuple(
+    kind.value for kind in (FeatureType.VISUAL, FeatureType.STATE, FeatureType.ACTION)
+)  # kinds whose normalisation has to be told
 _MOST = 100_000  # entries of a vector, or pixels along an axis: more is a slip of the keyboard
 
 
@@ -52,23 +54,18 @@ def _is_shape(shape: Any, axes: int | None) -> bool:
     )
 
 
-def normalization(field: str, mapping: Any) -> dict[str, NormalizationMode]:
-    """Return how kinds of features are normalised, by the name of the kind.
+def check_normalization(field: str, mapping: Mapping[str, NormalizationMode]) -> None:
+    """Check which kinds of features are normalised.
 
     Raises:
-        ConfigurationError: A kind or a mode is not known, or a kind that every policy has is left out: LeRobot would
-            not normalise it, without a word.
+        ConfigurationError: A kind is not known, or one that every policy has is left out: LeRobot would not normalise
+            it, without a word.
     """
-    kinds, modes = [kind.value for kind in FeatureType], [mode.value for mode in NormalizationMode]
-    is_known = isinstance(mapping, Mapping) and all(
-        isinstance(kind, str) and kind in kinds and isinstance(mode, str) and mode in modes
-        for kind, mode in mapping.items()
-    )
-    missing = [] if not is_known else [kind.value for kind in NORMALISED if kind.value not in mapping]
+    kinds = [kind.value for kind in FeatureType]
+    wrong = [f"{kind!r} is unknown" for kind in mapping if kind not in kinds]
+    wrong += [f"{kind!r} is missing" for kind in NORMALISED if kind not in mapping]
     require(
-        is_known and not missing,
-        f"{field}={shown(mapping)} is not possible; give {', '.join(kind.value for kind in NORMALISED)}"
-        f"{f' ({missing[0]} is missing)' if missing else ''}, each with one of {', '.join(modes)}; other kinds: "
-        f"{', '.join(kinds)}.",
+        not wrong,
+        f"{field}={shown(dict(mapping))} is not possible ({', '.join(wrong)}); name {', '.join(NORMALISED)}; others may be "
+        f"{', '.join(kind for kind in kinds if kind not in NORMALISED)}.",
     )
-    return {FeatureType(kind).value: NormalizationMode(mode) for kind, mode in mapping.items()}

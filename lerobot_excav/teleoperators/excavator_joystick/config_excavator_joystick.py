@@ -1,10 +1,10 @@
 """Configuration of `--teleop.type=excavator_joystick`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, setting
 from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PATTERNS
 
@@ -14,6 +14,8 @@ BUTTONS = (
     *("dpad_up", "dpad_down", "dpad_left", "dpad_right"),
 )
 """Buttons of a gamepad, by the names that SDL gives them; other names may be printed on the device."""
+
+_LAST_NUMBER = 255  # of a device, an axis or a button
 
 
 @TeleoperatorConfig.register_subclass("excavator_joystick")
@@ -40,25 +42,23 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
     expo: float = setting(
         "From 0, a straight response, to 1, the finest control near the centre", default=0.0, low=0, high=1
     )
-    invert: list[str] = field(default_factory=list)
-    """Axes to turn around, out of `left_x`, `left_y`, `right_x`, `right_y`."""
+    invert: list[str] = setting("Axes to turn around, as [left_x, right_y]", default_factory=list, choices=AXES)
 
     reinitialise_button: str = setting("Button that restarts the scene", default="back", choices=BUTTONS)
     next_scene_button: str = setting("Button that starts the next target or scene", default="start", choices=BUTTONS)
     device_name: str | None = setting("Part of the device's name, any case; left out: device_index", default=None)
-    device_index: int = setting("Position among the connected devices", default=0, low=0)
+    device_index: int = setting("Position among the connected devices", default=0, low=0, high=_LAST_NUMBER)
 
     # Numbers differ between devices, so none is assumed.
-    joystick_axes: dict[str, int] | None = None
-    """Number of each axis, for a device that SDL does not know as a gamepad."""
-
-    joystick_buttons: dict[str, int] | None = None
-    """Number of both buttons named above, for such a device."""
+    joystick_axes: dict[str, int] | None = setting(
+        "Number of each axis, for a device that SDL does not know as a gamepad", default=None, low=0, high=_LAST_NUMBER
+    )
+    joystick_buttons: dict[str, int] | None = setting(
+        "Number of both buttons named above, for such a device", default=None, low=0, high=_LAST_NUMBER
+    )
 
     def __post_init__(self) -> None:
         check_settings(self, "teleop.")
-        for axis in self.invert:
-            require_choice("teleop.invert", axis, AXES)
         require(
             self.reinitialise_button != self.next_scene_button,
             f"teleop.reinitialise_button and teleop.next_scene_button are both {self.next_scene_button!r}; "
@@ -67,8 +67,8 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
         for name, names in (("joystick_axes", AXES), ("joystick_buttons", self.buttons)):
             numbers = getattr(self, name)
             require(
-                numbers is None or (set(numbers) == set(names) and min(numbers.values()) >= 0),
-                f"teleop.{name}={numbers} is not complete; it must number {', '.join(names)} from 0 on.",
+                numbers is None or (set(numbers) == set(names) and len(set(numbers.values())) == len(names)),
+                f"teleop.{name}={numbers} is not complete; it must number {', '.join(names)}, each otherwise.",
             )
 
     @property

@@ -23,6 +23,16 @@ PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
         ("section = 3", "section=3: input should be a valid array"),
         ("[section]", r"section=\{\}: input should be a valid array"),
         ('[[section]]\ntitle = "s"\nrows = [3]', r"section\[0\]\.rows\[0\]=3: input should be an object"),
+        (SECTION + 'rows = [{ label = "../a", about = "x" }]', r"label: '\.\./a' cannot name a file"),
+        (SECTION + 'rows = [{ label = "", about = "x" }]', r"label: '' cannot name a file"),
+        (SECTION + 'rows = [{ label = "a", about = "" }]', r"about=''"),
+        ("[[curve]]\nlabel = 'a'\nfolder = 'v/..'\n", r"'\.\.' cannot name a file"),
+        ("[[curve]]\nlabel = 'a'\nfolder = ''\n", r"folder: '' is not a folder"),
+        ('[[clips]]\nlabel = "a"\nepisodes = [-1]', r"clips\[0\]\.episodes\[0\]=-1"),
+        ("text = " + "9" * 5000, "is not TOML"),
+        ("text = " + "[" * 5000, "is not TOML"),
+        (PAPER % "{ success = nan }", r"paper\.success=nan"),
+        (PAPER % "{ success = 1e400 }", r"paper\.success=inf"),
         (PAPER % "3", r"rows\[0\]\.paper=3: input should be an object"),
         (PAPER % '{ success = "96" }', r"rows\[0\]\.paper\.success='96': input should be a valid number"),
         (PAPER % "{ success = true }", r"rows\[0\]\.paper\.success=True: input should be a valid number"),
@@ -39,6 +49,12 @@ def test_rows_and_figures_are_read_as_their_fields_say(read_rows, tmp_path):
     contents = read_rows(PAPER % "{ success = 96 }")
     assert contents.rows[0].paper == {"success": 96.0}
     assert contents.metrics_path("a") == tmp_path / "test" / "a.jsonl"  # or in a folder, as elsewhere in these tests
+
+
+def test_a_file_that_is_not_text_is_named(tmp_path):
+    (tmp_path / "rows.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigurationError, match=r"rows\.toml is not TOML"):
+        read_contents(tmp_path / "rows.toml")
 
 
 def test_a_missing_file_is_named(tmp_path):
