@@ -5,6 +5,7 @@ The help text goes where draccus, LeRobot's command line parser, looks for it.
 """
 
 import dataclasses
+import functools
 import math
 import sys
 import typing
@@ -128,13 +129,16 @@ def check_settings(settings: Any, prefix: str = "") -> None:
     Raises:
         ConfigurationError: A value is of another type or not allowed; the message names the field.
     """
-    types = typing.get_type_hints(type(settings))
+    types = _type_hints(type(settings))
     for name, allowed in declared_settings(type(settings)).items():
         value = getattr(settings, name)
         _check(f"{prefix}{name}", value, types[name], allowed)
         if isinstance(value, Real) and not isinstance(value, int | float):
             # NumPy's own numbers do not go into JSON.
             setattr(settings, name, int(value) if isinstance(value, Integral) else float(value))
+
+
+_type_hints = functools.cache(typing.get_type_hints)
 
 
 def _check(name: str, value: Any, kind: Any, allowed: Allowed) -> None:

@@ -1,7 +1,6 @@
 """Command lines made of dataclasses, in LeRobot's own words, by the parser that LeRobot uses."""
 
 import argparse
-import functools
 import itertools
 import json
 import typing
@@ -175,7 +174,9 @@ def _require_no_truth_for_numbers(parsed: Arguments, options: Sequence[str]) -> 
     for word, following in itertools.pairwise([*options, ""]):
         name, equals, text = word.partition("=")
         text = text if equals else following
-        field = functools.reduce(lambda part, each: getattr(part, each, None), name.strip("-").split("."), parsed)
+        field: Any = parsed
+        for part in name.strip("-").split("."):
+            field = getattr(field, part, None)
         is_number = isinstance(field, int | float) and not isinstance(field, bool)
         require(
             not (is_number and name.startswith("--") and isinstance(parse_string(text), bool)),

@@ -45,7 +45,7 @@ class IndexArguments(DatasetArguments):
     include_failures: bool = setting("Whether to choose episodes without success as well", default=False)
     split: str | None = setting("Hold out whole scenes, or single episodes", default=None, choices=SPLIT_UNITS)
     eval_fraction: float | None = setting(
-        f"Part to hold out; left out: {DEFAULT_EVAL_FRACTION}", default=None, low=0.0, high=1.0
+        f"Part to hold out; left out: {DEFAULT_EVAL_FRACTION}", default=None, low=0.0, below=1.0
     )
     seed: int | None = setting("Seed of choice and split; left out: 0", default=None, low=0)
     flags: bool = setting("Whether to print nothing but the flags, for $(...)", default=False)

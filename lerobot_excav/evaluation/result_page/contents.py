@@ -29,9 +29,16 @@ def _folder(path: str) -> str:
     return path
 
 
+def _named_folder(path: str) -> str:
+    """Return a folder by whose name a page keeps the metrics in it."""
+    _plain_name(Path(path).name)
+    return path
+
+
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, AfterValidator(_plain_name)]
 Folder = Annotated[str, AfterValidator(_folder)]
+NamedFolder = Annotated[Folder, AfterValidator(_named_folder)]
 
 
 class _Table(BaseModel):
@@ -61,7 +68,7 @@ class CurveSource(_Table):
     """Evaluations of the checkpoints of one training."""
 
     label: Text  # in the plot
-    folder: Folder  # holds an evaluation per checkpoint, named by its step
+    folder: NamedFolder  # holds an evaluation per checkpoint, named by its step
 
 
 class Clips(_Table):
@@ -96,19 +103,15 @@ class Contents(_Table):
         labels = [row.label for row in self.rows]
         # A page keeps the metrics of a curve by the name of its folder.
         folders = [Path(curve.folder).name for curve in self.curve]
-        for folder in folders:
-            _plain_name(folder)
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
             raise ValueError(f"{twice} stands on the page twice")
         if twice := sorted({name for name in folders if folders.count(name) > 1}):
             raise ValueError(f"{twice} are the folders of two curves; name each folder once")
-        for name in [*labels, *folders]:
-            if Path(name).name != name or name.startswith("."):
-                raise ValueError(f"{name!r} names a file of the page; it must not be empty, hidden or hold a slash")
-        named = [section.reference for section in self.section if section.reference is not None]
-        for label in [*named, *(clips.label for clips in self.clips)]:
+        named = [("reference", section.reference) for section in self.section if section.reference is not None]
+        named += [("clips of", clips.label) for clips in self.clips]
+        for kind, label in named:
             if label not in labels:
-                raise ValueError(f"{label!r} is not a row; allowed: {', '.join(labels)}")
+                raise ValueError(f"{kind} {label!r:.60} is not a row; allowed: {', '.join(labels)}")
         return self
 
 

@@ -66,6 +66,6 @@ def check_normalization(field: str, mapping: Mapping[str, NormalizationMode]) ->
     wrong += [f"{kind!r} is missing" for kind in NORMALISED if kind not in mapping]
     require(
         not wrong,
-        f"{field}={shown(dict(mapping))} is not possible ({', '.join(wrong)}); name {', '.join(NORMALISED)}; others may be "
-        f"{', '.join(kind for kind in kinds if kind not in NORMALISED)}.",
+        f"{field}={shown(dict(mapping))} is not possible ({', '.join(wrong)}); name {', '.join(NORMALISED)}; known are "
+        f"{', '.join(kinds)}.",
     )
