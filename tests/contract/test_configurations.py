@@ -170,7 +170,9 @@ POLICY = {
     "chunk_size": whole(1, 10_000),
     "n_action_steps": optional(whole(1, 100)),  # of a chunk of 100
     "actions_per_token": optional(whole(1, 100, only=(1, 2, 4, 5, 10, 20, 25, 50, 100))),
-    "temporal_ensemble_coeff": optional(number(-0.8, 10)),  # of a chunk of 100: exp(0.8 * 99) is a number
+    "temporal_ensemble_coeff": optional(
+        number(-0.81, 10)._replace(examples=(-0.8, -0.82, 10, 10.1))
+    ),  # exp(0.81 * 99) is a number
     "vision_backbone": optional(one_of("resnet_small", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")),
     "pretrained_backbone_weights": optional(one_of("ResNet18_Weights.IMAGENET1K_V1", "DEFAULT", "IMAGENET1K_V1")),
     "backbone_norm": optional(one_of("batch", "frozen")),
