@@ -3,19 +3,22 @@
 import dataclasses
 
 import pytest
+from lerobot.configs import PreTrainedConfig
 from lerobot.envs.configs import EnvConfig
 from lerobot.robots import RobotConfig
+from lerobot.teleoperators import TeleoperatorConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers every type
 from lerobot_excav.setting import declared_settings
 
+KINDS = {"env": EnvConfig, "robot": RobotConfig, "teleop": TeleoperatorConfig, "policy": PreTrainedConfig}
 CONFIGS = {
     f"--{kind}.type={name}": config
-    for kind, registry in (("env", EnvConfig), ("robot", RobotConfig))
+    for kind, registry in KINDS.items()
     for name, config in registry.get_known_choices().items()
     if config.__module__.startswith("lerobot_excav.")
 }
-LEROBOTS_OWN = {"id", "calibration_dir"}
+LEROBOTS_OWN = {"id", "calibration_dir", "input_features", "output_features"}
 
 
 @pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
