@@ -129,7 +129,7 @@ def check_settings(settings: Any, prefix: str = "") -> None:
     Raises:
         ConfigurationError: A value is of another type or not allowed; the message names the field.
     """
-    types = _type_hints(type(settings))
+    types = _type_hints(type(settings))  # type: ignore[arg-type]  # a class can be hashed
     for name, allowed in declared_settings(type(settings)).items():
         value = getattr(settings, name)
         _check(f"{prefix}{name}", value, types[name], allowed)

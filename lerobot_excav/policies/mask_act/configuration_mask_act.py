@@ -140,8 +140,8 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     push_to_hub: bool = setting("Upload the trained policy", default=True)
     repo_id: str | None = setting("Repository to upload to, as user/name", default=None)
     private: bool | None = setting("Whether that repository is private", default=None)
-    tags: list[str] | None = setting("Tags there", default=None)
-    license: str | None = setting("Licence there", default=None)
+    tags: list[str] | None = setting("Its tags on the Hub", default=None)
+    license: str | None = setting("Its licence on the Hub", default=None)
     pretrained_path: Path | None = setting("Checkpoint to start from; --policy.path sets it", default=None)
     pretrained_revision: str | None = setting("Revision of that checkpoint on the Hub", default=None)
 
