@@ -1,7 +1,8 @@
 """Where `lerobot-record` and `lerobot-rollout` stand in a recording, learnt from what they announce.
 
-LeRobot tells a robot nothing about episodes. Both commands announce every phase on the root logger, in the
-thread that drives the robot and before the phase begins, so a handler there marks the exact boundaries.
+LeRobot tells a robot nothing about episodes. Both commands announce every phase in the log, in the thread that drives
+the robot and before the phase begins, so a handler of the root logger marks the exact boundaries. A rollout of strategy
+`sentry` cuts one long run into episodes; it announces the start, and every cut.
 The announcements are not an interface of LeRobot: the tests record for real, to notice when they change.
 """
 
@@ -13,6 +14,11 @@ _EPISODE = re.compile(r"Recording episode (\d+)")
 _RESET = "Reset the environment"
 _REPEAT = "Re-record episode"
 _STOP = "Stop recording"
+
+_DATASET = "lerobot.rollout.context"
+_READY = re.compile(r"Dataset ready: .* \((\d+) existing episodes\)")
+_SENTRY = "lerobot.rollout.strategies.sentry"
+_CUT = re.compile(r"Episode (\d+) saved")
 
 
 class RecordingPhases(logging.Handler):
@@ -35,15 +41,33 @@ class RecordingPhases(logging.Handler):
     ) -> None:
         super().__init__(level=logging.INFO)
         self._on_episode = on_episode
-        self._on_other = {_RESET: on_pause, _REPEAT: on_discard, _STOP: on_stop}
+        self._on_other = {
+            ("root", _RESET): on_pause,
+            ("root", _REPEAT): on_discard,
+            ("root", _STOP): on_stop,
+            (_SENTRY, "Sentry control loop ended — saving final episode"): on_pause,
+            (_SENTRY, "Stopping sentry recording"): on_stop,
+        }
+        self._existing_episodes = 0
+        self._is_sentry = False
 
     def emit(self, record: logging.LogRecord) -> None:
         """Recognise an announcement; errors of a callback reach the command, unlike errors of printing."""
-        if record.name != "root":
-            return
         message = record.getMessage()
-        episode = _EPISODE.fullmatch(message)
+        episode = self._beginning(record.name, message)
         if episode is not None:
-            self._on_episode(int(episode.group(1)))
-        elif message in self._on_other:
-            self._on_other[message]()
+            self._on_episode(episode)
+        elif (record.name, message) in self._on_other:
+            self._on_other[record.name, message]()
+
+    def _beginning(self, logger: str, message: str) -> int | None:
+        """Return the number of the episode that a message begins, if it does."""
+        if logger == _DATASET and (ready := _READY.fullmatch(message)):
+            self._existing_episodes = int(ready[1])
+        elif logger == _SENTRY and message.startswith("Sentry recording started"):
+            self._is_sentry = True
+            return self._existing_episodes
+        elif logger == "root":
+            begins = _EPISODE.fullmatch(message) or (self._is_sentry and _CUT.fullmatch(message))
+            return int(begins[1]) if begins else None
+        return None

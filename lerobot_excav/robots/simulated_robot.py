@@ -5,9 +5,9 @@ in real time. So a recording is consistent at any speed, and sending its actions
 repeats its states bit for bit.
 
 Every recorded episode starts from a fresh reset. With `advance=episode`, episode N of a dataset shows scene
-`scene_id + (target_id + N) // 4` with target `(target_id + N) % 4`; recording it again repeats both, and
-resuming a recording goes on where it stopped. Each press of `next_scene` leaves one target out, until the
-robot disconnects.
+`scene_id + (target_id + N) // 4` with target `(target_id + N) % 4`; recording it again repeats both. Each press of
+`next_scene` between two episodes leaves one target out. A recording that is resumed with the same session log goes on
+behind its last episode.
 """
 
 import logging
@@ -26,9 +26,11 @@ from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
+from lerobot_excav.robots.recording_command import require_fitting_command
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import SessionLog, default_path
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_pressed
+from lerobot_excav.robots.target_order import TargetOrder
 
 logger = logging.getLogger(__name__)
 
@@ -50,6 +52,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     """The simulated robots that are connected in this process."""
 
     def __init__(self, config: SimulatedRobotConfig) -> None:
+        require_fitting_command(config)
         super().__init__(config)
         self.config: Any = config
         self.task_spec = spec = config.task_spec
@@ -58,17 +61,15 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self.episode_count = 0
         self._env: MaskedTaskEnv[Any, Any] | None = None
         self._observation: dict[str, Any] = {}
-        self._first = config.scene_id * spec.target_count + config.target_id
-        self._skipped = 0
-        self._number = self._first  # counts targets over all scenes
         self._is_homing = False
         self._held_frames = 0
         log_path = config.session_log or default_path(f"{self.name}_sessions", datetime.now())
         self._log = SessionLog(log_path, spec, self.settings)
+        self._order = self._make_order()
         self._phases = RecordingPhases(
             on_episode=self._begin_episode,
-            on_pause=self._log.pause,
-            on_discard=self._log.discard,
+            on_pause=self._end_episode,
+            on_discard=self._discard_episode,
             on_stop=self._log.write,
         )
 
@@ -102,12 +103,12 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     @property
     def scene_id(self) -> int:
         """Current scene."""
-        return self._number // self.task_spec.target_count
+        return self._order.start[0]
 
     @property
     def target_id(self) -> int:
         """Current target of the scene."""
-        return self._number % self.task_spec.target_count
+        return self._order.start[1]
 
     @property
     def is_connected(self) -> bool:
@@ -136,7 +137,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         if self._env is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
         self._env = self.make_env()
-        self._number, self._skipped = self._first, 0
+        self._order = self._make_order()
         try:
             self.start_scene()
         except Exception:
@@ -192,8 +193,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             self._is_homing = True
             return dict(action)
         if is_pressed(action, NEXT_SCENE):
-            self._number += 1
-            self._skipped += 1
+            self._order.press()
             self.restart_scene()
             return dict(action)
         if is_pressed(action, REINITIALISE):
@@ -239,12 +239,25 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         logger.info("Scene %d, target %d of set %s", self.scene_id, self.target_id, self.settings.scene_set)
 
     def _begin_episode(self, episode_index: int) -> None:
-        if self.config.advance == "episode":
-            self._number = self._first + self._skipped + episode_index
+        self._order.begin(episode_index)
         self.start_scene()
         self._log.begin(episode_index, scene_id=self.scene_id, target_id=self.target_id)
         if self._held_frames:
             self._log.note_restart()
+
+    def _end_episode(self) -> None:
+        self._order.end()
+        self._log.pause()
+
+    def _discard_episode(self) -> None:
+        self._order.discard()
+        self._log.discard()
+
+    def _make_order(self) -> TargetOrder:
+        config, count = self.config, self.task_spec.target_count
+        first = config.scene_id * count + config.target_id
+        by_episode = config.advance == "episode"
+        return TargetOrder(first, by_episode=by_episode, per_scene=count, log_path=self._log.path)
 
     def _drives_home(self, action: Mapping[str, Any]) -> bool:
         """Tell whether an action holds positions only, and the machine takes none."""

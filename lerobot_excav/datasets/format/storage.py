@@ -7,15 +7,11 @@ sample's own pictures are decoded: 10 and 17 ms. So long chunks need videos, and
 
 from typing import Any, Literal
 
+from lerobot_excav.envs.masks.video import LOSSLESS_CODEC, LOSSLESS_PIX_FMTS, keeps_masks
 from lerobot_excav.errors import DatasetError
 
 Storage = Literal["image", "video"]
 STORAGES: tuple[Storage, ...] = ("image", "video")
-
-LOSSLESS_CODEC = "h264"
-"""Codec that is lossless at crf=0; at the same value HEVC is not (grey levels of noise off by up to 24)."""
-LOSSLESS_PIX_FMTS = ("yuv444p", "gbrp")
-"""Pixel formats that keep every pixel's colour; all others average colours over neighbouring pixels."""
 
 
 def require_lossless(key: str, info: dict[str, Any]) -> None:
@@ -25,7 +21,7 @@ def require_lossless(key: str, info: dict[str, Any]) -> None:
         DatasetError: It was compressed with losses, or its settings are unknown.
     """
     codec, crf, pix_fmt = (info.get(f"video.{name}") for name in ("codec", "crf", "pix_fmt"))
-    if codec != LOSSLESS_CODEC or crf != 0 or pix_fmt not in LOSSLESS_PIX_FMTS:
+    if not keeps_masks(codec, crf, pix_fmt):
         raise DatasetError(
             f"{key}: dtype='video' with codec={codec!r}, crf={crf} and pix_fmt={pix_fmt!r}, which blurs the mask; "
             f"needed are codec={LOSSLESS_CODEC!r}, crf=0 and pix_fmt one of {', '.join(LOSSLESS_PIX_FMTS)}; record "

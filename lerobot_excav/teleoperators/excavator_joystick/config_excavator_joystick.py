@@ -46,8 +46,15 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
 
     reinitialise_button: str = setting("Button that restarts the scene", default="back", choices=BUTTONS)
     next_scene_button: str = setting("Button that starts the next target or scene", default="start", choices=BUTTONS)
-    device_name: str | None = setting("Part of the device's name, any case; left out: device_index", default=None)
-    device_index: int = setting("Position among the connected devices", default=0, low=0, high=_LAST_NUMBER)
+    device_name: str | None = setting(
+        "Name of the device or a part of it, any case; left out: the only gamepad", default=None
+    )
+    device_index: int | None = setting(
+        "Position among the connected devices, where names do not tell them apart",
+        default=None,
+        low=0,
+        high=_LAST_NUMBER,
+    )
 
     # Numbers differ between devices, so none is assumed.
     joystick_axes: dict[str, int] | None = setting(
@@ -64,12 +71,21 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
             f"teleop.reinitialise_button and teleop.next_scene_button are both {self.next_scene_button!r}; "
             "give them two buttons.",
         )
+        require(
+            self.device_name is None or self.device_index is None,
+            f"teleop.device_name={self.device_name!r} and teleop.device_index={self.device_index} both choose a "
+            "device; give one of them.",
+        )
         for name, names in (("joystick_axes", AXES), ("joystick_buttons", self.buttons)):
             numbers = getattr(self, name)
             require(
                 numbers is None or (set(numbers) == set(names) and len(set(numbers.values())) == len(names)),
                 f"teleop.{name}={numbers} is not complete; it must number {', '.join(names)}, each otherwise.",
             )
+        require(
+            (self.joystick_axes is None) == (self.joystick_buttons is None),
+            "teleop.joystick_axes and teleop.joystick_buttons belong together; give both or neither.",
+        )
 
     @property
     def buttons(self) -> tuple[str, str]:

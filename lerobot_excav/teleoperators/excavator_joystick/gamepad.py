@@ -6,7 +6,7 @@ when the configuration gives them.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from lerobot_excav.errors import DeviceError
@@ -112,44 +112,77 @@ def open_gamepad(config: ExcavatorJoystickConfig) -> Gamepad:
             does not number.
     """
     pygame, sdl_controller = _start_sdl()
-    found = [pygame.joystick.Joystick(i).get_name() for i in range(pygame.joystick.get_count())]
-    chosen = choose_device(found, index=config.device_index, name=config.device_name)
-    if sdl_controller.is_controller(chosen):
+    count = pygame.joystick.get_count()
+    found = [(pygame.joystick.Joystick(i).get_name(), bool(sdl_controller.is_controller(i))) for i in range(count)]
+    axes, buttons = config.joystick_axes, config.joystick_buttons
+    is_numbered = axes is not None and buttons is not None
+    chosen = choose_device(found, index=config.device_index, name=config.device_name, is_numbered=is_numbered)
+    if axes is not None and buttons is not None:
+        return PlainJoystick(pygame, pygame.joystick.Joystick(chosen), axes, buttons)
+    name, is_gamepad = found[chosen]
+    if is_gamepad:
         return KnownGamepad(pygame, sdl_controller.Controller(chosen), config.buttons)
     joystick = pygame.joystick.Joystick(chosen)
-    if config.joystick_axes is None or config.joystick_buttons is None:
-        raise DeviceError(
-            f"SDL does not know {found[chosen]!r} as a gamepad ({joystick.get_numaxes()} axes, "
-            f"{joystick.get_numbuttons()} buttons), so its axes have no names. Number them, for example "
-            "--teleop.joystick_axes='{left_x: 0, left_y: 1, right_x: 3, right_y: 4}' "
-            f"--teleop.joystick_buttons='{{{config.buttons[0]}: 6, {config.buttons[1]}: 7}}', or give SDL a mapping in "
-            "the environment variable SDL_GAMECONTROLLERCONFIG."
-        )
-    return PlainJoystick(pygame, joystick, config.joystick_axes, config.joystick_buttons)
+    raise DeviceError(
+        f"SDL does not know {name!r} as a gamepad ({joystick.get_numaxes()} axes, "
+        f"{joystick.get_numbuttons()} buttons), so its axes have no names. Number them, for example "
+        "--teleop.joystick_axes='{left_x: 0, left_y: 1, right_x: 3, right_y: 4}' "
+        f"--teleop.joystick_buttons='{{{config.buttons[0]}: 6, {config.buttons[1]}: 7}}', or give SDL a mapping in "
+        "the environment variable SDL_GAMECONTROLLERCONFIG."
+    )
 
 
-def choose_device(found: list[str], *, index: int, name: str | None) -> int:
+def choose_device(
+    found: Sequence[tuple[str, bool]], *, index: int | None = None, name: str | None = None, is_numbered: bool = False
+) -> int:
     """Return the position of the wanted device.
 
+    SDL lists keyboards with extra keys and the motion sensors of gamepads as joysticks too. So a device that SDL knows
+    as a gamepad comes first, unless the user has numbered the axes and so means another.
+
     Args:
-        found: Names of the connected devices.
-        index: Position wanted, when `name` is None.
-        name: Part of the name wanted, any case; the first match counts.
+        found: Name of each connected device, and whether SDL knows it as a gamepad.
+        index: Position wanted.
+        name: Whole name wanted or, if no device has it, a part of one; any case.
+        is_numbered: Whether the user has numbered axes and buttons.
 
     Raises:
-        DeviceError: No device has this position or name.
+        DeviceError: No device has this position or name, or several come into question.
     """
-    matches = [i for i, each in enumerate(found) if name is None or name.lower() in each.lower()]
-    if name is None and index < len(found):
-        return index
-    if name is not None and matches:
-        return matches[0]
-    wanted = f"teleop.device_index={index}" if name is None else f"teleop.device_name={name!r}"
-    listed = ", ".join(f"{i}: {each!r}" for i, each in enumerate(found)) or "none"
-    raise DeviceError(
-        f"{wanted} does not match a gamepad; connected: {listed}. Plug one in, check that you may read /dev/input, "
-        "or use --teleop.type=excavator_operator, which needs no gamepad."
+    listed = ", ".join(
+        f"{i}: {each!r}{' (gamepad)' if is_gamepad else ''}" for i, (each, is_gamepad) in enumerate(found)
     )
+    if index is not None:
+        candidates = [index] if index < len(found) else []
+    else:
+        candidates = _of_kind(found, _named(found, name), is_numbered=is_numbered)
+    if len(candidates) == 1:
+        return candidates[0]
+    wanted = {"index": index, "name": name}
+    asked = "".join(f"teleop.device_{key}={value!r}" for key, value in wanted.items() if value is not None)
+    if candidates:
+        raise DeviceError(
+            f"{asked or 'the gamepad'} could be any of {len(candidates)} devices; connected: {listed}. Choose one with "
+            f"--teleop.device_index, out of {', '.join(map(str, candidates))}."
+        )
+    raise DeviceError(
+        f"{f'{asked} does not match a device' if asked else 'there is no gamepad'}; connected: {listed or 'none'}. Plug "
+        "one in, check that you may read /dev/input, or use --teleop.type=excavator_operator, which needs no gamepad."
+    )
+
+
+def _named(found: Sequence[tuple[str, bool]], name: str | None) -> list[int]:
+    """Return the devices of a name or, if there are none, those whose name holds it."""
+    if name is None:
+        return list(range(len(found)))
+    same = [i for i, (each, _) in enumerate(found) if each.lower() == name.lower()]
+    return same or [i for i, (each, _) in enumerate(found) if name.lower() in each.lower()]
+
+
+def _of_kind(found: Sequence[tuple[str, bool]], among: list[int], *, is_numbered: bool) -> list[int]:
+    """Return the gamepads among some devices; if there are none or the axes are numbered, all of them."""
+    gamepads = [i for i in among if found[i][1]]
+    return among if is_numbered or not gamepads else gamepads
 
 
 def lost(name: str) -> DeviceError:

@@ -30,6 +30,7 @@ class Command:
         ("device_index", -1, "teleop.device_index=-1"),
         ("reinitialise_button", "select", "teleop.reinitialise_button='select' is not possible; give one of a,"),
         ("next_scene_button", "back", "both 'back'; give them two buttons"),
+        ("joystick_axes", AXES, "joystick_buttons belong together; give both or neither"),
         ("joystick_axes", {"left_x": 0}, "it must number left_x, left_y, right_x, right_y"),
         ("joystick_axes", AXES | {"left_x": -1}, "give names, each with a whole number from 0 to 255"),
         ("joystick_axes", AXES | {"left_x": 1}, "each otherwise"),
@@ -42,6 +43,11 @@ def test_an_impossible_value_is_named_with_what_is_allowed(name, value, message)
     with pytest.raises(ConfigurationError) as raised:
         ExcavatorJoystickConfig(**{name: value})
     assert message in str(raised.value)
+
+
+def test_a_device_is_chosen_in_one_way():
+    with pytest.raises(ConfigurationError, match=r"device_name='pad' and teleop\.device_index=1 both choose"):
+        ExcavatorJoystickConfig(device_name="pad", device_index=1)
 
 
 def test_a_joystick_can_be_numbered_on_the_command_line():

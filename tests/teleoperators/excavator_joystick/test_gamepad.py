@@ -84,24 +84,56 @@ def test_numbers_beyond_the_joystick_are_refused(sdl, joystick):
         PlainJoystick(sdl, joystick, AXES | {"right_y": 9}, {"back": 6, "start": 7})
 
 
-@pytest.mark.parametrize(("index", "name", "chosen"), [(2, None, 2), (0, "pad", 1), (2, "stick", 0)])
-def test_devices_are_chosen_by_position_or_by_part_of_the_name(index, name, chosen):
-    assert choose_device(["Left Stick", "Xbox Pad", "Pad 2"], index=index, name=name) == chosen
+KEYBOARD, MOTION, PAD = ("Keychron K2", False), ("Sony Wireless Controller Motion Sensors", False), ("Xbox Pad", True)
+SONY, STICK = ("Sony Wireless Controller", True), ("Left Stick", False)
 
 
 @pytest.mark.parametrize(
-    ("found", "index", "name", "message"),
+    ("found", "wanted", "chosen"),
     [
-        ([], 0, None, "teleop.device_index=0 does not match a gamepad; connected: none. Plug one in"),
-        (["Xbox Pad"], 1, None, "teleop.device_index=1 does not match a gamepad; connected: 0: 'Xbox Pad'"),
-        (["Xbox Pad"], 0, "stick", "teleop.device_name='stick' does not match a gamepad; connected: 0: 'Xbox"),
+        ([PAD], {}, 0),
+        ([KEYBOARD, PAD], {}, 1),  # a keyboard with extra keys may come first
+        ([MOTION, SONY], {}, 1),
+        ([MOTION, SONY, PAD], {"name": "wireless controller"}, 1),
+        ([PAD, SONY], {"name": "pad"}, 0),
+        ([KEYBOARD, PAD, SONY], {"index": 2}, 2),
+        ([KEYBOARD, PAD], {"index": 0}, 0),  # whoever numbers a device gets it
+        ([STICK], {}, 0),
+        ([STICK, PAD], {"name": "stick", "is_numbered": True}, 0),
+        ([MOTION, ("Wireless Controller", False)], {"name": "Wireless controller", "is_numbered": True}, 1),
     ],
 )
-def test_a_missing_device_is_described(found, index, name, message):
+def test_a_gamepad_comes_before_other_devices_and_a_whole_name_before_a_part(found, wanted, chosen):
+    assert choose_device(found, **wanted) == chosen
+
+
+@pytest.mark.parametrize(
+    ("found", "wanted", "message"),
+    [
+        ([], {}, "there is no gamepad; connected: none. Plug one in"),
+        ([PAD], {"index": 1}, "teleop.device_index=1 does not match a device; connected: 0: 'Xbox Pad' (gamepad)"),
+        ([PAD], {"name": "stick"}, "teleop.device_name='stick' does not match a device; connected: 0: 'Xbox"),
+    ],
+)
+def test_a_missing_device_is_described(found, wanted, message):
     with pytest.raises(DeviceError) as raised:
-        choose_device(found, index=index, name=name)
+        choose_device(found, **wanted)
     assert message in str(raised.value)
     assert "--teleop.type=excavator_operator" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("found", "wanted", "message"),
+    [
+        ([PAD, KEYBOARD, SONY], {}, "the gamepad could be any of 2 devices; .*1: 'Keychron K2', 2: 'Sony.*out of 0, 2"),
+        ([PAD, PAD], {"name": "xbox"}, "teleop.device_name='xbox' could be any of 2 devices.*out of 0, 1"),
+        ([KEYBOARD, STICK], {"is_numbered": True}, "any of 2 devices"),
+        ([PAD, STICK], {"is_numbered": True}, "any of 2 devices"),  # numbers may be meant for either
+    ],
+)
+def test_where_several_devices_could_be_meant_they_are_listed(found, wanted, message):
+    with pytest.raises(DeviceError, match=message):
+        choose_device(found, **wanted)
 
 
 def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(monkeypatch, sdl, controller):
@@ -115,6 +147,7 @@ def test_a_gamepad_that_sdl_knows_needs_no_numbers_and_another_joystick_does(mon
     unknown = r"does not know 'Stick' as a gamepad \(5 axes, 8 buttons\).*joystick_axes='\{left_x: 0"
     with pytest.raises(DeviceError, match=unknown):
         opened(known=False)
+    assert isinstance(opened(known=True, **NUMBERS), PlainJoystick)  # given numbers are used
     with pytest.raises(DeviceError, match=r"teleop\.device_index=1"):
         opened(known=True, device_index=1)
 

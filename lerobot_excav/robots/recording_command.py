@@ -1,0 +1,125 @@
+"""The command of LeRobot that drives a robot: whether its rate and its storage suit a simulation with a mask.
+
+A robot sees its own configuration only. The command's configuration holds that one, so it is found in memory, whether
+its values came from flags, from a file or from Python. It exists before the robot is made, and the robot is made before
+the dataset's folder, so a refused command leaves nothing behind. The names of the fields are not an interface of
+LeRobot: the tests run the commands for real, to notice when they change.
+"""
+
+import gc
+import json
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from lerobot.configs.dataset import DatasetRecordConfig
+from lerobot.utils.constants import HF_LEROBOT_HOME
+
+from lerobot_excav.envs.masks.video import LOSSLESS_CODEC, LOSSLESS_PIX_FMTS, keeps_masks
+from lerobot_excav.errors import ConfigurationError
+
+LOSSLESS_FLAGS = (
+    f"--dataset.rgb_encoder.vcodec={LOSSLESS_CODEC} --dataset.rgb_encoder.pix_fmt={LOSSLESS_PIX_FMTS[0]} "
+    "--dataset.rgb_encoder.crf=0"
+)
+
+UNLOGGED_STRATEGIES = ("highlight", "dagger")
+"""Rollouts whose episodes begin anywhere within a run, and not with a reset."""
+
+logger = logging.getLogger(__name__)
+
+
+def command_of(robot_config: Any) -> Any | None:
+    """Return the configuration of the command that a robot was configured in, or None in other Python code."""
+    for holder in gc.get_referrers(robot_config):
+        # The fields of an object may lie in a dictionary of their own.
+        for each in gc.get_referrers(holder) if isinstance(holder, dict) else [holder]:
+            if hasattr(type(each), "__dataclass_fields__") and vars(each).get("robot") is robot_config:
+                return each
+    return None
+
+
+def require_fitting_command(robot_config: Any) -> None:
+    """Check that the command gives the robot one action per frame, and stores the mask as it is.
+
+    A warning tells of a rollout that the session log cannot describe.
+
+    Raises:
+        ConfigurationError: It does not; the message holds the flags to add.
+    """
+    command = command_of(robot_config)
+    if command is None:
+        return
+    faults = [*_wrong_rates(command, robot_config.fps), *_blurred_mask(command)]
+    if faults:
+        raise ConfigurationError(
+            f"this command and robot.fps={robot_config.fps} do not fit: {'; '.join(fault for fault, _ in faults)}. "
+            f"Nothing was recorded or moved. Give {' '.join(flag for _, flag in faults)}"
+        )
+    strategy = getattr(getattr(command, "strategy", None), "type", None)
+    if strategy in UNLOGGED_STRATEGIES:
+        logger.warning(
+            f"--strategy.type={strategy} begins its episodes within a run, so the session log does not hold them and "
+            "`lerobot-excav index` cannot add the excav.* columns. --strategy.type=episodic and sentry are logged."
+        )
+
+
+def recorded_dataset(command: Any) -> Any | None:
+    """Return how the command records, or None if it does not."""
+    dataset = getattr(command, "dataset", None)
+    return dataset if isinstance(dataset, DatasetRecordConfig) else None
+
+
+def _wrong_rates(command: Any, fps: int) -> Iterator[tuple[str, str]]:
+    """Yield every rate of the command that is not the robot's, in words, and the flag that mends it."""
+    if hasattr(command, "fps"):
+        times = getattr(command, "interpolation_multiplier", 1)
+        if times != 1 and recorded_dataset(command) is not None:
+            yield (
+                f"--interpolation_multiplier={times} stores every observation {times} times",
+                "--interpolation_multiplier=1",
+            )
+            times = 1
+        if command.fps * times != fps:
+            words = f" and --interpolation_multiplier={times}" * (times != 1)
+            yield (
+                f"--fps={command.fps:g}{words} sends {command.fps * times:g} actions a second, each of which "
+                f"moves the simulation by 1/{fps} s",
+                f"--fps={fps / times:g}",
+            )
+    recorded = recorded_dataset(command)
+    if recorded is not None and recorded.fps != fps:
+        yield (
+            f"--dataset.fps={recorded.fps} would tell the dataset of {recorded.fps} frames a second",
+            f"--dataset.fps={fps}",
+        )
+    replayed = _replayed_rate(command)
+    if replayed not in (None, fps):
+        yield f"the dataset was recorded at {replayed} frames a second", f"--robot.fps={replayed}"
+
+
+def _blurred_mask(command: Any) -> Iterator[tuple[str, str]]:
+    recorded = recorded_dataset(command)
+    if recorded is None or not recorded.video:
+        return
+    encoder = recorded.rgb_encoder
+    if not keeps_masks(encoder.vcodec, encoder.crf, encoder.pix_fmt):
+        yield (
+            f"--dataset.video=true with vcodec={encoder.vcodec}, pix_fmt={encoder.pix_fmt} and crf={encoder.crf} "
+            "blurs the target mask, and `lerobot-excav index` refuses such a recording",
+            f"--dataset.video=false (or, for training with long chunks, {LOSSLESS_FLAGS})",
+        )
+
+
+def _replayed_rate(command: Any) -> int | None:
+    """Return the frame rate of the dataset that the command plays again, if it does and the dataset is here."""
+    dataset = getattr(command, "dataset", None)
+    if not hasattr(dataset, "episode"):
+        return None
+    info = Path(dataset.root or HF_LEROBOT_HOME / dataset.repo_id, "meta", "info.json")
+    try:
+        rate: int | None = json.loads(info.read_text(encoding="utf-8")).get("fps")
+    except (OSError, ValueError, AttributeError):
+        return None  # LeRobot says what is wrong with it
+    return rate
