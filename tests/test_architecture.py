@@ -13,8 +13,17 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # a row may use the other row. `plugin`, the list of what is registered with LeRobot, is imported by LeRobot alone.
 LAYERS = [
     [
-        *("envs.constants", "envs.plugins", "envs.soil", "envs.machines", "envs.masks", "envs.tasks", "envs", "robots"),
-        *("teleoperators", "datasets", "evaluation", "scripts"),
+        *(
+            "envs.constants",
+            "envs.holder",
+            "envs.plugins",
+            "envs.soil",
+            "envs.machines",
+            "envs.masks",
+            "envs.tasks",
+            "envs",
+        ),
+        *("robots", "teleoperators", "datasets", "evaluation", "scripts"),
     ],
     ["policies"],
 ]

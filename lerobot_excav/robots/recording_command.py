@@ -1,12 +1,9 @@
 """The command of LeRobot that drives a robot: whether its rate and its storage suit a simulation with a mask.
 
-A robot sees its own configuration only. The command's configuration holds that one, so it is found in memory, whether
-its values came from flags, from a file or from Python. It exists before the robot is made, and the robot is made before
-the dataset's folder, so a refused command leaves nothing behind. The names of the fields are not an interface of
-LeRobot: the tests run the commands for real, to notice when they change.
+The command's configuration exists before the robot is made, and the robot is made before the dataset's folder, so a
+refused command leaves nothing behind.
 """
 
-import gc
 import json
 import logging
 from collections.abc import Iterator
@@ -16,6 +13,7 @@ from typing import Any
 from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.utils.constants import HF_LEROBOT_HOME
 
+from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.envs.masks.video import LOSSLESS_CODEC, LOSSLESS_PIX_FMTS, keeps_masks
 from lerobot_excav.errors import ConfigurationError
 
@@ -30,16 +28,6 @@ UNLOGGED_STRATEGIES = ("highlight", "dagger")
 logger = logging.getLogger(__name__)
 
 
-def command_of(robot_config: Any) -> Any | None:
-    """Return the configuration of the command that a robot was configured in, or None in other Python code."""
-    for holder in gc.get_referrers(robot_config):
-        # The fields of an object may lie in a dictionary of their own.
-        for each in gc.get_referrers(holder) if isinstance(holder, dict) else [holder]:
-            if hasattr(type(each), "__dataclass_fields__") and vars(each).get("robot") is robot_config:
-                return each
-    return None
-
-
 def require_fitting_command(robot_config: Any) -> None:
     """Check that the command gives the robot one action per frame, and stores the mask as it is.
 
@@ -48,7 +36,7 @@ def require_fitting_command(robot_config: Any) -> None:
     Raises:
         ConfigurationError: It does not; the message holds the flags to add.
     """
-    command = command_of(robot_config)
+    command = holder_of(robot_config, "robot")
     if command is None:
         return
     faults = [*_wrong_rates(command, robot_config.fps), *_blurred_mask(command)]

@@ -1,5 +1,7 @@
 """Every simulated robot on a stand-in environment: instant, and its state tells what happened to it."""
 
+import logging
+
 import numpy as np
 import pytest
 from lerobot.robots import RobotConfig, make_robot_from_config
@@ -87,3 +89,28 @@ def still(new_robot):
     spec = new_robot().task_spec
     middle = 0.5 * (np.asarray(spec.action_low) + np.asarray(spec.action_high))
     return dict(zip(spec.action_names, middle.astype(np.float32).tolist(), strict=True))
+
+
+@pytest.fixture
+def announcements_are_heard():
+    """Set the root logger's level as LeRobot's commands do."""
+    level = logging.getLogger().level
+    logging.getLogger().setLevel(logging.NOTSET)
+    yield
+    logging.getLogger().setLevel(level)
+
+
+@pytest.fixture
+def record_episode(still, announcements_are_heard):
+    """Play LeRobot's part of an episode; return its scene, target and steps before its first frame."""
+
+    def _record(robot, index, *, frames=2):
+        logging.info(f"Recording episode {index}")
+        first = robot.get_observation()
+        for _ in range(frames):
+            robot.send_action(still)
+        logging.info("Reset the environment")
+        robot.send_action(still)
+        return tuple(int(first[name]) for name in robot.task_spec.state_names[:3])
+
+    return _record

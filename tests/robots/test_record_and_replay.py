@@ -12,6 +12,7 @@ from lerobot.scripts import lerobot_record, lerobot_replay
 
 from lerobot_excav.datasets.format.schema import dataset_features, excav_features
 from lerobot_excav.envs.tasks.registry import task_of_robot
+from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 from lerobot_excav.scripts import main
 
@@ -30,7 +31,7 @@ def flags(kind, values):
 def record(run_command, tmp_path):
     """Record with a robot's scripted operator; return the dataset and the lines of the session."""
 
-    def _record(robot_type, episodes, **robot):
+    def _record(robot_type, episodes, *, resume=False, **robot):
         operator = robot_type.replace("sim", "operator")
         settings, seconds = ROBOTS[robot_type]
         dataset = {"fps": task_of_robot(robot_type).make_settings().fps, "num_episodes": episodes, "single_task": "go"}
@@ -41,6 +42,7 @@ def record(run_command, tmp_path):
             *flags("robot", {"type": robot_type, **SIZE, **settings, **robot}),
             *flags("teleop", {"type": operator, "calibration_dir": tmp_path}),
             *flags("dataset", dataset),
+            f"--resume={str(resume).lower()}",
         )
         lines = (tmp_path / "session.jsonl").read_text().splitlines()
         return dataset_of(tmp_path), [json.loads(line) for line in lines]
@@ -128,3 +130,15 @@ def test_an_episode_recorded_again_starts_over(record, monkeypatch):
     env = task_of_robot("excavator_sim").make_env(obs_type="agent_pos")
     start, _ = env.reset(options={"scene_id": 0, "target_id": 2})
     assert np.array_equal(dataset[0]["observation.state"].numpy(), start["agent_pos"])
+
+
+def test_a_resumed_recording_goes_on_behind_the_last_pair(record, tmp_path):
+    for resume in (False, True):
+        dataset, session = record("fr5_sim", 1, resume=resume, target_id=2)
+    assert [each["commands"][0] for each in session] == [[0, 2], [0, 3]]
+    assert dataset.meta.total_episodes == 2
+    # Without the log of the first session nothing is recorded, and what is there stays readable.
+    with pytest.raises(ConfigurationError, match=r"has 2 episodes already.*--robot\.session_log=FILE"):
+        record("fr5_sim", 1, resume=True, target_id=2, session_log=tmp_path / "another.jsonl")
+    assert dataset_of(tmp_path).meta.total_episodes == 2
+    assert main.main(["index", str(tmp_path / "data"), f"--session={tmp_path / 'session.jsonl'}"]) == 0

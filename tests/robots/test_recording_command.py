@@ -11,9 +11,10 @@ from lerobot.robots import make_robot_from_config
 from lerobot.rollout.configs import DAggerStrategyConfig, HighlightStrategyConfig, SentryStrategyConfig
 from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_teleoperate
 
+from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
-from lerobot_excav.robots.recording_command import LOSSLESS_FLAGS, command_of, require_fitting_command
+from lerobot_excav.robots.recording_command import LOSSLESS_FLAGS, require_fitting_command
 
 FITTING = ["--dataset.fps=10", "--dataset.video=false"]
 RECORD = ["--robot.type=excavator_sim", "--dataset.repo_id=someone/data", "--dataset.single_task=go"]
@@ -72,7 +73,7 @@ def test_a_wrong_rate_or_a_lossy_mask_is_refused_with_the_flags_that_mend_it(rec
 )
 def test_a_fitting_recording_is_accepted(record_config, flags):
     config = record_config(*flags)
-    assert command_of(config.robot) is config
+    assert holder_of(config.robot, "robot") is config
     require_fitting_command(config.robot)
 
 
@@ -133,7 +134,7 @@ def test_a_replay_at_another_rate_than_that_of_the_recording_is_refused(tmp_path
 
 def test_python_code_without_a_command_is_free():
     config = ExcavatorSimConfig()
-    assert command_of(config) is None
+    assert holder_of(config, "robot") is None
     holder = SimpleNamespace(robot=config, fps=30)
-    assert command_of(config) is None
+    assert holder_of(config, "robot") is None
     require_fitting_command(holder.robot)

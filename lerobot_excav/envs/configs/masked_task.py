@@ -9,6 +9,7 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
+from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.envs.tasks.masked_env import RENDER_MODES
 from lerobot_excav.envs.tasks.registry import task_of_settings, task_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
@@ -99,7 +100,11 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
         """Create the vector environment of one evaluation, as `{self.type: {0: vector environment}}`.
 
         With `use_async_envs` each of several environments gets a process of its own.
+
+        Raises:
+            ConfigurationError: The command wants LeRobot's recording of more than one batch, which it cannot write.
         """
+        self._require_one_recorded_batch(n_envs)
         from lerobot_excav.envs.configs.metrics_log import MetricsLog
         from lerobot_excav.envs.configs.vector import make_vector_env
 
@@ -108,6 +113,16 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
             log = MetricsLog(self.metrics_path, n_envs=n_envs, max_episodes=self.metrics_episodes)
         vector = make_vector_env(self._make_one, n_envs, use_async=use_async_envs, metrics_log=log)
         return {self.type: {0: vector}}
+
+    def _require_one_recorded_batch(self, n_envs: int) -> None:
+        """Raise where LeRobot 0.6.1 would end in a FileExistsError after the first batch."""
+        wanted = getattr(holder_of(self, "env"), "eval", None)
+        require(
+            not getattr(wanted, "recording", False) or wanted.n_episodes <= n_envs,
+            f"--eval.recording=true records one batch only, and --eval.n_episodes={getattr(wanted, 'n_episodes', 0)} "
+            f"needs several of {n_envs}. Leave it out, or give --eval.batch_size the number of episodes. "
+            "`lerobot-rollout --strategy.type=episodic` records what a policy does in a way that can be trained on.",
+        )
 
     def _make_one(self) -> gym.Env[Any, Any]:
         # Workers unpickle this bound method: that imports the module of the configuration, hence the package that

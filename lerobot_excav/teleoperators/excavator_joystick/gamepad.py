@@ -165,9 +165,10 @@ def choose_device(
             f"{asked or 'the gamepad'} could be any of {len(candidates)} devices; connected: {listed}. Choose one with "
             f"--teleop.device_index, out of {', '.join(map(str, candidates))}."
         )
+    problem = f"{asked} does not match a device" if asked else "there is no gamepad"
     raise DeviceError(
-        f"{f'{asked} does not match a device' if asked else 'there is no gamepad'}; connected: {listed or 'none'}. Plug "
-        "one in, check that you may read /dev/input, or use --teleop.type=excavator_operator, which needs no gamepad."
+        f"{problem}; connected: {listed or 'none'}. Plug one in, check that you may read /dev/input, or use "
+        "--teleop.type=excavator_operator, which needs no gamepad."
     )
 
 

@@ -1,0 +1,84 @@
+"""Every operation of lerobot-edit-dataset on a dataset of this package, and what `qc` says afterwards."""
+
+import shutil
+import sys
+
+import pytest
+from lerobot.scripts import lerobot_edit_dataset
+
+from lerobot_excav.datasets.check.quality_check import check_dataset
+from lerobot_excav.datasets.format.episode_table import read_info
+from lerobot_excav.errors import DatasetError
+
+from .toy import MAIN
+
+LOSSLESS = ["vcodec=h264", "pix_fmt=yuv444p", "crf=0", "g=2"]
+
+
+@pytest.fixture
+def edit(changing_datasets, tmp_path, monkeypatch):
+    """Run an operation on a copy of a dataset of 8 episodes, by storage; returns the folder of the result."""
+
+    def _edit(operation, *flags, storage="image", into="new"):
+        shutil.copytree(changing_datasets[storage], tmp_path / "data")
+        out = ["--new_repo_id=local/new", f"--new_root={tmp_path / into}"] if into != "data" else []
+        words = [f"--operation.{flag}" for flag in (f"type={operation}", *flags)]
+        monkeypatch.setattr(sys, "argv", ["c", "--repo_id=local/data", f"--root={tmp_path / 'data'}", *out, *words])
+        lerobot_edit_dataset.main()
+        return tmp_path / into
+
+    return _edit
+
+
+def assert_passes(root, episodes):
+    assert check_dataset(root, replays=1)["qc"].tolist() == ["passed"] * episodes
+
+
+def test_episodes_are_deleted(edit):
+    assert_passes(edit("delete_episodes", "episode_indices=[0, 5]"), 6)
+
+
+def test_a_dataset_is_split(edit, tmp_path):
+    edit("split", 'splits={"a": 0.25, "b": 0.75}')
+    assert_passes(tmp_path / "new/a", 2)
+    assert_passes(tmp_path / "new/b", 6)
+
+
+def test_datasets_are_merged(edit, tmp_path):
+    roots = f"roots=['{tmp_path / 'data'}', '{tmp_path / 'data'}']"
+    assert_passes(edit("merge", "repo_ids=['local/data', 'local/data']", roots), 16)
+
+
+def test_the_words_of_the_task_are_changed(edit):
+    assert_passes(edit("modify_tasks", "new_task=dig", into="data"), 8)
+
+
+def test_statistics_are_computed_again(edit):
+    assert_passes(edit("recompute_stats", "skip_image_video=false", "overwrite=true", into="data"), 8)
+
+
+def test_a_dataset_is_described(edit, capsys):
+    edit("info", into="data")
+    assert "8" in capsys.readouterr().out
+
+
+def test_without_a_camera_of_the_task_it_is_another_dataset(edit):
+    root = edit("remove_feature", f"feature_names=['{MAIN}']")
+    with pytest.raises(DatasetError, match=MAIN):
+        check_dataset(root, replays=0)
+
+
+def test_pictures_become_videos_with_lossless_settings_only(edit):
+    root = edit("convert_image_to_video", *[f"rgb_encoder.{each}" for each in LOSSLESS], "num_workers=1")
+    assert read_info(root).features[MAIN]["dtype"] == "video"
+    assert_passes(root, 8)
+
+
+def test_lerobots_own_settings_for_videos_are_refused_afterwards(edit):
+    with pytest.raises(DatasetError, match="blurs the mask"):
+        check_dataset(edit("convert_image_to_video", "num_workers=1"), replays=0)
+
+
+def test_videos_are_encoded_again_with_lossless_settings_only(edit):
+    settings = [f"rgb_encoder.{each}" for each in LOSSLESS]
+    assert_passes(edit("reencode_videos", *settings, storage="video"), 8)
