@@ -6,18 +6,23 @@ import re
 import runpy
 import shlex
 import sys
+from functools import partial
 from importlib.metadata import distribution
 from pathlib import Path
 
 import draccus
 import lerobot
 import pytest
+import toy_reach  # noqa: F401 - registers the task
 from lerobot.configs.eval import EvalPipelineConfig
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.rollout.configs import RolloutStrategyConfig
 from lerobot.scripts import (
     lerobot_calibrate,
+    lerobot_dataset_viz,
     lerobot_edit_dataset,
     lerobot_eval,
+    lerobot_imgtransform_viz,
     lerobot_info,
     lerobot_record,
     lerobot_setup_motors,
@@ -25,6 +30,8 @@ from lerobot.scripts import (
 )
 
 import lerobot_excav.plugin  # noqa: F401
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.recording_command import require_fitting_command
@@ -62,13 +69,16 @@ def test_every_row_says_whether_it_works_and_which_existing_test_shows_it():
 @pytest.mark.parametrize("name", TEXTS)
 def test_commands_of_the_pages_that_drive_a_robot_are_accepted_by_it(name, tmp_path):
     shown = "\n".join(re.findall(r"^```bash\n(.*?)^```$", TEXTS[name], flags=re.DOTALL | re.MULTILINE))
-    for line in shown.replace("\\\n", " ").splitlines():
-        program, *flags = shlex.split(line, comments=True) or [""]
+    lines = shown.replace("\\\n", " ").splitlines()
+    for line in lines:
+        if not line.startswith((*CONFIGS, "lerobot-rollout")):
+            continue
+        program, *flags = shlex.split(line, comments=True)
         if program in CONFIGS:
             flags = [re.sub("mask_source=redness", "mask_source=oracle", flag) for flag in flags]
             config = draccus.parse(CONFIGS[program], args=flags)
             require_fitting_command(config.robot)
-        elif program == "lerobot-rollout":
+        else:
             assert {"--fps=10", "--dataset.fps=10", "--dataset.video=false"} <= set(flags)
 
 
@@ -114,6 +124,30 @@ def test_the_system_is_described(run, capsys):
     assert "lerobot scripts" in capsys.readouterr().out
 
 
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """A scene of the example task with its 4 targets."""
+    settings = DemonstrationSettings.of("toy_reach", {"observation_height": 32, "observation_width": 48}, scenes=1)
+    root = tmp_path_factory.mktemp("commands") / "data"
+    record_demonstrations(settings, root, workers=0, show_progress=False)
+    return root
+
+
+def test_image_transforms_are_shown(run, dataset, tmp_path, monkeypatch):
+    opened = partial(LeRobotDataset, root=dataset)  # the command itself looks into HF_LEROBOT_HOME only
+    monkeypatch.setattr(lerobot_imgtransform_viz, "LeRobotDataset", opened)
+    monkeypatch.chdir(tmp_path)
+    run(lerobot_imgtransform_viz.main, "--repo_id=local/data", "--image_transforms.enable=true")
+    assert len(list(tmp_path.rglob("*.png"))) > 10
+
+
+def test_a_dataset_is_visualised(run, dataset, tmp_path):
+    pytest.importorskip("rerun", reason="LeRobot's extra viz")
+    flags = ["--repo-id=local/data", f"--root={dataset}", "--episode-index=0", "--save=1"]
+    run(lerobot_dataset_viz.main, *flags, f"--output-dir={tmp_path}")
+    assert list(tmp_path.glob("*.rrd"))
+
+
 def eval_flags(tmp_path, *flags):
     policy = [f"--policy.path={CHECKPOINT}", "--policy.device=cpu", f"--output_dir={tmp_path / 'out'}"]
     return [*policy, "--env.type=fr5_grasp", *flags]
@@ -130,7 +164,7 @@ def test_the_recording_of_several_batches_is_refused(monkeypatch, tmp_path, epis
     flags = ["--eval.recording=true", f"--eval.n_episodes={episodes}", "--eval.batch_size=1"]
     flags = eval_flags(tmp_path, *flags)
     monkeypatch.setattr(sys, "argv", ["lerobot-eval", *flags])  # LeRobot looks for --policy.path there
-    rest = [flag for flag in flags if not flag.startswith("--policy.path")]
+    rest = [flag for flag in flags if not flag.startswith("--policy.")]
     config = draccus.parse(EvalPipelineConfig, args=rest)
     assert isinstance(config.env, FR5GraspEnvConfig)
     if refused:
