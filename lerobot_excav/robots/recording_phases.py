@@ -40,7 +40,7 @@ class RecordingPhases(logging.Handler):
         on_stop: Callable[[], None],
     ) -> None:
         super().__init__(level=logging.INFO)
-        self._on_episode = on_episode
+        self._on_episode, self._on_pause = on_episode, on_pause
         self._on_other = {
             ("root", _RESET): on_pause,
             ("root", _REPEAT): on_discard,
@@ -56,6 +56,8 @@ class RecordingPhases(logging.Handler):
         message = record.getMessage()
         episode = self._beginning(record.name, message)
         if episode is not None:
+            if self._is_sentry:
+                self._on_pause()  # a cut ends the episode before it
             self._on_episode(episode)
         elif (record.name, message) in self._on_other:
             self._on_other[record.name, message]()
