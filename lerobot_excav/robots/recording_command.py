@@ -103,7 +103,7 @@ def _blurred_mask(command: Any) -> Iterator[tuple[str, str]]:
 def _replayed_rate(command: Any) -> int | None:
     """Return the frame rate of the dataset that the command plays again, if it does and the dataset is here."""
     dataset = getattr(command, "dataset", None)
-    if not hasattr(dataset, "episode"):
+    if dataset is None or not hasattr(dataset, "episode"):
         return None
     info = Path(dataset.root or HF_LEROBOT_HOME / dataset.repo_id, "meta", "info.json")
     try:
