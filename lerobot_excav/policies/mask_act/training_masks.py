@@ -1,6 +1,7 @@
 """Masks of the dataset that a policy is trained on: can they be used, and do they arrive as they are stored?"""
 
 import logging
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ class TrainingMasks:
         try:
             stored = stored_mask(self._meta, str(self._key), index=index, episode=episode) > 0.5
         except FileNotFoundError as error:
-            self._stop_comparing(f"{error.filename} is not on this machine")
+            self._stop_comparing(str(error))
             return
         seen = mask[row].cpu() > 0.5
         if seen.shape != stored.shape:
@@ -144,7 +145,7 @@ def stored_mask(meta: LeRobotDatasetMetadata, key: str, *, index: int, episode: 
         FileNotFoundError: The file is not there: the dataset is streamed.
     """
     is_image = meta.features[key]["dtype"] == "image"
-    path = meta.root / meta.get_data_file_path(episode)
+    path = present(meta.root / meta.get_data_file_path(episode))
     columns = [key if is_image else "timestamp"]
     rows: list[dict[str, Any]] = pq.read_table(path, columns=columns, filters=[("index", "=", index)]).to_pylist()
     if len(rows) != 1:
@@ -153,12 +154,17 @@ def stored_mask(meta: LeRobotDatasetMetadata, key: str, *, index: int, episode: 
         pixels: Tensor = to_tensor(Image().decode_example(rows[0][key]))
     else:
         time = meta.episodes[episode][f"videos/{key}/from_timestamp"] + rows[0]["timestamp"]
-        video = meta.root / meta.get_video_file_path(episode, key)
-        if not video.is_file():
-            raise FileNotFoundError(2, "no such video", str(video))
+        video = present(meta.root / meta.get_video_file_path(episode, key))
         # Not torchcodec, which keeps its decoders open: data loaders that fork after that hang.
         pixels = decode_video_frames(video, [time], 0.5 / meta.fps, backend="pyav")[0]
     return pixels[:1]
+
+
+def present(path: Path) -> Path:
+    """Return the path of a file that is there, or raise `FileNotFoundError`."""
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is not on this machine")
+    return path
 
 
 def require_target(mask_key: str, low: float, high: float) -> None:

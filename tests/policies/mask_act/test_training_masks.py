@@ -38,7 +38,9 @@ def moving(episode, frame):
 
 def write(root, mask_of=moving, *, key=MASK, dtype="image", episodes=2):
     """Write a dataset with LeRobot's own writer."""
-    images = {k: {"dtype": dtype, "shape": (HEIGHT, WIDTH, 3), "names": ["height", "width", "channels"]} for k in (MAIN, key)}
+    images = {
+        k: {"dtype": dtype, "shape": (HEIGHT, WIDTH, 3), "names": ["height", "width", "channels"]} for k in (MAIN, key)
+    }
     dataset = LeRobotDataset.create("tests/masks", 10, FEATURES | images, root, use_videos=dtype == "video")
     generator = np.random.default_rng(0)
     for episode in range(episodes):
@@ -146,18 +148,20 @@ def test_validation_compares_nothing_because_lerobot_does_not_transform_it(folde
     trained_on(dataset).eval().forward(moved(frames(dataset, range(4)), [2]))
 
 
-def test_a_mask_renamed_on_the_way_is_compared_with_its_own_column(tmp_path):
+def test_a_mask_renamed_on_the_way_is_compared_with_its_own_column(folders, tmp_path):
+    first = trained_on(opened(folders / "image"))
+    first.save_pretrained(tmp_path / "checkpoint")
     dataset = opened(write(tmp_path / "data", key=GOAL))
-    features = {
-        key.replace("goal", "target_mask"): ft
-        for key, ft in trained_on(dataset, mask_key=GOAL).config.input_features.items()
-    }
-    policy = make_policy(MaskACTConfig(**TINY, input_features=features), ds_meta=dataset.meta, rename_map={GOAL: MASK})
+
+    def tuned():
+        first.config.pretrained_path = tmp_path / "checkpoint"
+        return make_policy(first.config, ds_meta=dataset.meta, rename_map={GOAL: MASK}).train()
+
     batch = frames(dataset, range(4))
     batch[MASK] = batch.pop(GOAL)
-    policy.train().forward(batch)
+    tuned().forward(batch)
     with pytest.raises(ConfigurationError, match="is not the one"):
-        make_policy(policy.config, ds_meta=dataset.meta, rename_map={GOAL: MASK}).train().forward(moved(batch, [2]))
+        tuned().forward(moved(batch, [2]))
 
 
 def test_what_cannot_be_compared_is_said(folders, tmp_path, caplog):
