@@ -89,5 +89,5 @@ def test_transforms_that_part_mask_and_picture_end_training_and_the_named_ones_d
     with pytest.raises(ConfigurationError, match="is not the one that the dataset holds") as refusal:
         train(dataset, tmp_path / "moved", *NEW, *moving, "--steps=1")
     assert SAFE_TRANSFORMS in str(refusal.value)
-    still = [*shlex.split(SAFE_TRANSFORMS), "--policy.augment_shift_px=2", "--policy.use_amp=true"]
+    still = [*shlex.split(SAFE_TRANSFORMS), "--policy.augment_shift_px=2"]
     assert settings(train(dataset, tmp_path / "still", *NEW, *still, "--steps=1"))["augment_shift_px"] == 2
