@@ -54,8 +54,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         super(ACTPolicy, self).__init__(config)
         config.validate_features()
         self.config = config
-        self.model = MaskACTNetwork(config)
         self._training_masks = TrainingMasks(config, kwargs.get("dataset_meta"))
+        self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
         # LeRobot's `drop_queued_actions` clears what has this name.
         self._action_queue = (

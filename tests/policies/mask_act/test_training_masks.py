@@ -1,5 +1,6 @@
 import shlex
 import shutil
+from pathlib import Path
 
 import draccus
 import numpy as np
@@ -184,6 +185,7 @@ def test_a_frame_that_its_file_does_not_hold_is_an_error(folders):
 
 def test_the_transforms_named_as_safe_leave_every_mask_as_it_is():
     arguments = shlex.split(SAFE_TRANSFORMS.replace("--dataset.", "--"))
+    assert SAFE_TRANSFORMS in (Path(__file__).parents[3] / "docs/reference/mask_act.md").read_text(encoding="utf-8")
     config = draccus.parse(DatasetConfig, args=["--repo_id=x", *arguments]).image_transforms
     torch.manual_seed(0)
     transform, pictures = ImageTransforms(config), 0
