@@ -74,9 +74,7 @@ def run(*arguments):
 def digests(*places: Path, own: Iterable[str] = ()):
     """Return a digest of every file below some folders, but for a command's own, named by the ends of their paths."""
     files = (file for place in places for file in sorted(place.rglob("*")) if file.is_file())
-    return {
-        file: hashlib.sha256(file.read_bytes()).hexdigest() for file in files if not str(file).endswith(tuple(own))
-    }
+    return {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in files if not str(file).endswith(tuple(own))}
 
 
 def require_right(change: Change, outcome: Outcome):

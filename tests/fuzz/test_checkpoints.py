@@ -17,7 +17,19 @@ from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 from lerobot_excav.policies.mask_act.processor_mask_act import make_mask_act_pre_post_processors
 
 from ..policies.mask_act.conftest import STATE, make_policy
-from .mutation import GARBAGE, Outcome, digests, harmful, harmless, inputs, overwritten, require_kept, require_right, run, truncated
+from .mutation import (
+    GARBAGE,
+    Outcome,
+    digests,
+    harmful,
+    harmless,
+    inputs,
+    overwritten,
+    require_kept,
+    require_right,
+    run,
+    truncated,
+)
 
 WEIGHTS, CONFIG = "model.safetensors", "config.json"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
@@ -107,7 +119,9 @@ def spoil(kind, number):
 
 @st.composite
 def changed_weights(draw):
-    kind = draw(st.sampled_from(["dropped", "all dropped", "renamed", "longer", "shorter", "added", "nan", "inf", "same"]))
+    kind = draw(
+        st.sampled_from(["dropped", "all dropped", "renamed", "longer", "shorter", "added", "nan", "inf", "same"])
+    )
     number = draw(st.integers(0, 1000))
     if kind == "same":
         return harmless("weights written again", weights_change(lambda weights: None))

@@ -82,8 +82,11 @@ def changed_rows(draw):
         table.append(copy.deepcopy(table[0]))
         words = f"the first of {place} stands there twice"
     elif kind == "words":
-        place, name = draw(st.sampled_from([((), "title"), (("section", 0), "text"), (("section", 0, "rows", 0), "about")]))
-        at(rows, place)[name] = words = draw(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=40))
+        place, name = draw(
+            st.sampled_from([((), "title"), (("section", 0), "text"), (("section", 0, "rows", 0), "about")])
+        )
+        letters = st.characters(exclude_categories=["Cs", "Cc"])
+        at(rows, place)[name] = words = draw(st.text(letters, min_size=1, max_size=40))
     elif kind == "figure":
         rows["section"][0]["rows"][0]["paper"]["success"] = words = draw(st.floats(0.0, 100.0))
     else:
