@@ -188,6 +188,8 @@ POLICY = {
     "lr_schedule": optional(one_of("constant", "cosine")),
     "lr_warmup_steps": optional(whole(0, ENDLESS)),
     **dict.fromkeys(("preset", "preset_applied"), optional(one_of("paper", "fast"))),
+    "augment_shift_px": whole(0, 1024),
+    "compare_masks": flag,
     "mask_key": feature_name,
     "main_camera": optional(feature_name),
     **dict.fromkeys(("withhold_mask", "target_token", "coordinate_channels", "optimizer_fused"), flag),
