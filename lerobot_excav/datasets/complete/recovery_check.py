@@ -77,8 +77,8 @@ def require_one_kind(episodes: Sequence[SessionEpisode], remains: Remains, sessi
 def recorded_features(episode: SessionEpisode, remains: Remains) -> dict[str, schema.Feature]:
     """Describe the columns that `lerobot-record` makes of an episode."""
     height, width = episode.task_settings.observation_size
-    features = schema.datasetrecorded_features(episode.spec, height=height, width=width, storage=remains.storage)
-    return {key: feature for key, feature in features.items() if key not in schema.excavrecorded_features(episode.spec)}
+    features = schema.dataset_features(episode.spec, height=height, width=width, storage=remains.storage)
+    return {key: feature for key, feature in features.items() if key not in schema.excav_features(episode.spec)}
 
 
 def _essence(feature: schema.Feature) -> tuple[Any, ...]:

@@ -26,7 +26,8 @@ def _require_float32(value: float) -> float:
     return value
 
 
-Vector = list[Annotated[FiniteFloat, Field(ge=-3e38, le=3e38), AfterValidator(_require_float32)]]
+_LARGEST = float(np.finfo(np.float32).max)
+Vector = list[Annotated[FiniteFloat, Field(ge=-_LARGEST, le=_LARGEST), AfterValidator(_require_float32)]]
 
 
 class _Event(BaseModel):
@@ -142,9 +143,9 @@ def _in_words(problem: Any) -> str:
         "missing": f"lacks {name}",
         "extra_forbidden": f"{name} is not known",
         "json_invalid": f"not JSON ({problem['msg']}), and it is not the last line of a session that was interrupted",
-        "model_type": "a JSON object is expected",
-        "model_attributes_type": "a JSON object is expected",
         "union_tag_not_found": "lacks event (a log of version 0.2.0 has a line per episode; that release completes it)",
         "union_tag_invalid": f"event={problem['ctx'].get('tag')!r} is not known" if "ctx" in problem else "",
     }
+    if not name and problem["type"] not in words:
+        return "a JSON object is expected"
     return words.get(problem["type"], f"{name}={problem['input']!r}: {problem['msg']}")

@@ -19,9 +19,12 @@ def write_statistics(root: Path, features: Mapping[str, Feature]) -> None:
         episode.index: compute_episode_stats({key: episode.array(key) for key in numeric}, numeric)
         for episode in iterate_episodes(root, list(numeric))
     }
+    stale = tuple(f"stats/{key}/" for key in numeric)
     for path in sorted(root.glob("meta/episodes/*/*.parquet")):
         table = pq.read_table(path)
         rows = [episodes[index] for index in table["episode_index"].to_pylist()]
+        # Columns that were removed from a dataset leave theirs behind.
+        table = table.drop_columns([name for name in table.column_names if name.startswith(stale)])
         for key in numeric:
             for name in rows[0][key]:
                 values = pa.array([row[key][name].tolist() for row in rows])
