@@ -68,6 +68,8 @@ def test_the_seed_reaches_the_split(paired_dataset, output):
     [
         ("--out=x", "--out is of use with --session only"),
         ("--skip_restarted", "--skip_restarted is of use with --session only"),
+        ("--recover", "--recover is of use with --session only"),
+        ("--task=go", "--task is of use with --recover only"),
         ("--eval_fraction=0.3", "--eval_fraction=0.3 has no effect without --split"),
         ("--seed=0", "--seed=0 has no effect without a choice"),
     ],

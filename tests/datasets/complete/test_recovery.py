@@ -132,7 +132,7 @@ def test_task_texts_are_those_of_readable_episodes_and_several_are_asked_about(r
     root, log = crashed
     texts = pd.DataFrame({"task_index": [0, 1]}, index=pd.Index(["go", "go on"], name="task"))
     texts.to_parquet(root / "meta" / "tasks.parquet")
-    with pytest.raises(DatasetError, match="has 2 task texts, .* episode 0 .* --task: 'go', 'go on'"):
+    with pytest.raises(DatasetError, match=r"has 2 task texts, .* episode 0 .* --task: 'go', 'go on'"):
         recover_recording(root, log)
     episodes = pd.DataFrame({"episode_index": [0, 1], "tasks": [["go"], ["go on"]]})
     episodes.to_parquet(next(root.glob("meta/episodes/*/*.parquet")))
@@ -181,7 +181,7 @@ def test_what_cannot_be_recovered_is_named(crashed, tmp_path):
         recover_recording(root, log)
     change_info(root, total_episodes=0, features=features)
     log.write_text("".join(log.read_text().splitlines(keepends=True)[:4]))
-    with pytest.raises(DatasetError, match="no episode of .* was finished, so there is nothing to recover"):
+    with pytest.raises(DatasetError, match=r"no episode of .* was finished, so there is nothing to recover"):
         recover_recording(root, log)
 
 
