@@ -44,11 +44,12 @@ def workspace(beside: Path) -> Iterator[Path]:
 
 
 def exchange(new: Path, root: Path, aside: Path) -> None:
-    """Move the dataset at `root` into the folder `aside`, which exists and is empty, and that at `new` to `root`.
+    """Move the dataset at `root` into a new folder `aside`, and that at `new` to `root`.
 
     Raises:
         OSError: A part cannot be moved; then everything is back in its place.
     """
+    aside.mkdir()
     moves = [(root / name, aside / name) for name in CONTENTS if (root / name).exists()]
     moves += [(path, root / path.name) for path in sorted(new.iterdir())]
     done: list[tuple[Path, Path]] = []
@@ -59,16 +60,15 @@ def exchange(new: Path, root: Path, aside: Path) -> None:
     except BaseException:
         for source, destination in reversed(done):
             destination.rename(source)
+        aside.rmdir()
         raise
 
 
-def keep_foreign_files(old: Path, root: Path) -> None:
-    """Move what a dataset held beside LeRobot's own files to where it was, now that another dataset is there."""
-    for path in sorted(old.rglob("*")):
-        relative = path.relative_to(old)
-        destination = root / relative
-        is_known = any(relative.match(known) and len(relative.parts) == known.count("/") + 1 for known in DERIVED)
-        if is_known or path.is_dir() or destination.exists():
-            continue
-        destination.parent.mkdir(parents=True, exist_ok=True)
-        path.rename(destination)
+def copy_foreign_files(root: Path, new: Path) -> None:
+    """Copy what a dataset holds among LeRobot's own files into the one that is to take its place."""
+    for path in (path for name in CONTENTS for path in sorted((root / name).rglob("*"))):
+        relative = path.relative_to(root)
+        is_derived = any(relative.match(known) and len(relative.parts) == known.count("/") + 1 for known in DERIVED)
+        if path.is_file() and not is_derived and not (new / relative).exists():
+            (new / relative).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, new / relative)

@@ -74,7 +74,7 @@ def recover_recording(root: Path, session_path: Path, *, out: Path | None = None
         if aside is None:
             (folder / "recovered").rename(out or root)
         else:
-            _put_aside(folder / "recovered", root, aside)
+            exchange(folder / "recovered", root, aside)
     left = sorted(session.keys() - {episode.episode_index for episode in finished})
     return Recovery(root=out or root, aside=aside, episodes=len(finished), lost=left[0] if left else None)
 
@@ -144,12 +144,3 @@ def _free_name(root: Path) -> Path:
         number += 1
         path = root.with_name(f"{root.name}.damaged-{number}")
     return path
-
-
-def _put_aside(new: Path, root: Path, aside: Path) -> None:
-    aside.mkdir()
-    try:
-        exchange(new, root, aside)
-    except BaseException:
-        aside.rmdir()
-        raise

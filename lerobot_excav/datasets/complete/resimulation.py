@@ -5,6 +5,7 @@ if the recorded states come out, so do the task state and the outcome of the ori
 the same state, so states cannot tell them apart: the target is known by its mask.
 """
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
 
-from lerobot_excav.datasets.complete.exchange import exchange, keep_foreign_files, require_free, workspace
+from lerobot_excav.datasets.complete.exchange import copy_foreign_files, exchange, require_free, workspace
 from lerobot_excav.datasets.complete.recording_check import (
     require_completable,
     require_recorded_targets,
@@ -67,10 +68,11 @@ def complete_recording(
         write_index(completed)
         if out is not None:
             return completed.rename(out)
-        original = folder / "original"
-        original.mkdir()
+        copy_foreign_files(root, completed)
+        # Not within the folder that is removed whatever happens.
+        original = folder.with_name(f"{folder.name}.original")
         exchange(completed, root, original)
-        keep_foreign_files(original, root)
+        shutil.rmtree(original)
         return root
 
 
