@@ -112,7 +112,7 @@ def _recover(arguments: IndexArguments) -> int:
 
     assert arguments.session is not None  # checked before
     recovery = recover_recording(arguments.root, arguments.session, out=arguments.out, task=arguments.task)
-    print(f"{recovery.root}: {recovery.episodes} episodes recovered")
+    print(f"{recovery.root}: {recovery.episodes} episodes recovered; task: {', '.join(map(repr, recovery.texts))}")
     if recovery.lost is not None:
         print(f"episode {recovery.lost} was not finished, and is left out")
     if recovery.aside is not None:

@@ -19,7 +19,7 @@ from lerobot_excav.scripts import main
 
 SIZE = (48, 64)
 EPISODES = 4
-PATIENCE_S = 120.0
+PATIENCE_S = 600.0
 # Frames per second, and how long an episode lasts [s].
 ROBOTS = {"fr5_sim": (50, 0.4), "excavator_sim": (10, 0.8)}
 

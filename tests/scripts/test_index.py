@@ -63,6 +63,11 @@ def test_the_seed_reaches_the_split(paired_dataset, output):
     assert len(texts) > 1
 
 
+@pytest.mark.parametrize("other", ["--flags", "--skip_restarted", "--select=paired", "--seed=3"])
+def test_recovery_does_nothing_else(paired_dataset, output, other):
+    assert "--recover only writes the dataset again" in output(paired_dataset, "--session=s", "--recover", other)
+
+
 @pytest.mark.parametrize(
     ("option", "message"),
     [

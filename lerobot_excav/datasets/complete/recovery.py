@@ -39,12 +39,14 @@ class Recovery:
         aside: Where the damaged files are now; None if they stayed where they were.
         episodes: How many episodes were recovered.
         lost: Number of the episode that was at work and is left out, if there was one.
+        texts: Task texts that they were given.
     """
 
     root: Path
     aside: Path | None
     episodes: int
     lost: int | None
+    texts: list[str]
 
 
 def recover_recording(root: Path, session_path: Path, *, out: Path | None = None, task: str | None = None) -> Recovery:
@@ -76,7 +78,8 @@ def recover_recording(root: Path, session_path: Path, *, out: Path | None = None
         else:
             exchange(folder / "recovered", root, aside)
     left = sorted(session.keys() - {episode.episode_index for episode in finished})
-    return Recovery(root=out or root, aside=aside, episodes=len(finished), lost=left[0] if left else None)
+    lost = left[0] if left else None
+    return Recovery(root=out or root, aside=aside, episodes=len(finished), lost=lost, texts=list(dict.fromkeys(texts)))
 
 
 def _write(root: Path, episodes: Sequence[SessionEpisode], texts: Sequence[str], remains: Remains) -> None:
