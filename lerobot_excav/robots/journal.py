@@ -32,8 +32,8 @@ class Journal:
         self._is_new = False
         self._is_cut_off = False
 
-    def open(self) -> None:
-        """Open the file, so that what is wrong with it is known before anything happens.
+    def start(self) -> None:
+        """Open the file to append to it, so that what is wrong with it is known before anything happens.
 
         Raises:
             ForeignFileError: The file holds something else.
@@ -53,8 +53,8 @@ class Journal:
         assert self._file is not None  # opened
         text = "".join(json.dumps(record) + "\n" for record in records)
         data = ("\n" * self._is_cut_off + text).encode()
-        self._is_cut_off = False
-        if self._file.write(data) != len(data):
+        self._is_cut_off = self._file.write(data) != len(data)
+        if self._is_cut_off:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def close(self) -> None:

@@ -63,11 +63,11 @@ class SessionLog:
         self._is_running = False  # whether an episode is
         self._target_id: int | None = None
 
-    def open(self) -> None:
+    def start(self) -> None:
         """Open the file to append to it; it is made if it is missing."""
         self._is_begun = self._is_running = False
         try:
-            self._journal.open()
+            self._journal.start()
         except ForeignFileError as error:
             raise DeviceError(
                 f"robot.session_log={str(self.path)!r} exists and does not begin like a session log of this version; "

@@ -135,7 +135,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         """
         if self._env is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
-        self._log.open()
+        self._log.start()
         try:
             self._env = self.make_env()
             self._number, self._skipped = self._first, 0

@@ -44,7 +44,7 @@ def load(root, episodes=None):
 def write_session(dataset, path, env=None, episodes=None):
     """Write the session log of a robot that recorded a dataset."""
     log = SessionLog(path, REACH, toy_settings(env=env).env)
-    log.open()
+    log.start()
     keys = (PAIR_KEY, SCENE_KEY, TARGET_KEY, STATE_KEY, ACTION_KEY)
     for episode in iterate_episodes(dataset, keys, episodes=episodes):
         log.begin(episode.index, scene_id=episode.pair.scene_id, target_id=episode.pair.target_id)

@@ -15,7 +15,7 @@ STATE, ACTION = [0.0] * 8, [0.5] * 4
 @pytest.fixture
 def log(tmp_path):
     log = SessionLog(tmp_path / "folder" / "session.jsonl", SCOOP, SCOOP.make_settings())
-    log.open()
+    log.start()
     yield log
     log.close()
 
@@ -50,7 +50,7 @@ def test_wherever_a_crash_cuts_the_log_off_only_the_last_line_is_lost_and_the_ne
         log.close()
         log.path.write_bytes(whole[:size])
         assert ends_of(log.path) == {0: (1, "ended"), 1: (1, None)}
-        log.open()
+        log.start()
         record(log, 1, targets=(2, 2))
         log.stop()
         assert ends_of(log.path) == {0: (1, "ended"), 1: (1, "stopped")}
