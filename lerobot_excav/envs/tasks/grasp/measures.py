@@ -20,9 +20,8 @@ class GraspRecord(EpisodeRecord):
     """Outcome of one grasping episode; where the command changed, the last one counts."""
 
     episode_return: float  # sum of the rewards
-    first_grasped_block: int = Field(
-        ge=NO_BLOCK, lt=TARGETS_PER_SCENE
-    )  # first block that the fingers lifted since the last command; -1 if they lifted none
+    # First block that the fingers lifted since the last command; -1 if they lifted none.
+    first_grasped_block: int = Field(ge=NO_BLOCK, lt=TARGETS_PER_SCENE)
     target_in_tray: bool  # whether the commanded block rests in the tray
     blocks_in_tray: int = Field(ge=0, le=TARGETS_PER_SCENE)  # how many blocks do
 
