@@ -134,6 +134,9 @@ def main(arguments: list[str]) -> int:
         print(__doc__)
         return 2
     if arguments[0] == "record":
+        if Path(arguments[1]).exists():
+            print(f"{arguments[1]} exists; choose another file, or remove it first")
+            return 2
         record(Path(arguments[1]))
         return 0
     problems = compare(*map(Path, arguments))

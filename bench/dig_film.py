@@ -60,4 +60,6 @@ def pictures(height: int = 480, width: int = 848) -> Iterator[NDArray[np.uint8]]
 if __name__ == "__main__":
     if len(sys.argv) != 2 or not sys.argv[1].endswith(".mp4"):
         sys.exit("Give one file that ends in .mp4: python -m bench.dig_film outputs/dig.mp4")
+    if Path(sys.argv[1]).exists():
+        sys.exit(f"{sys.argv[1]} exists; choose another file, or remove it first")
     write_video(Path(sys.argv[1]), pictures(), FRAMES_PER_SECOND, crf=_QUALITY)

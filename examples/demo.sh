@@ -6,7 +6,14 @@ OUT=${1:?usage: demo.sh OUTPUT_FOLDER}
 SCENES=${DEMO_SCENES:-6}     # x 4 targets = paired demonstrations
 STEPS=${DEMO_STEPS:-900}     # training steps
 EPISODES=${DEMO_EPISODES:-4} # evaluation episodes, on test scenes
+# Folders in it are removed by name, so it has to be a folder of this script.
+if [ -n "$(ls -A "$OUT" 2>/dev/null)" ] && [ ! -f "$OUT/.made_by_demo.sh" ]; then
+  echo "demo.sh: $OUT holds something that this script has not made; move it elsewhere, or name another folder:" >&2
+  echo "  examples/demo.sh FOLDER" >&2
+  exit 2
+fi
 mkdir -p "$OUT"
+touch "$OUT/.made_by_demo.sh"
 
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 

@@ -12,6 +12,15 @@ if [ ! -f "$CHECKPOINT/config.json" ]; then
   exit 2
 fi
 
+# Folders in it are removed by name, so it has to be a folder of this script.
+if [ -n "$(ls -A "$OUT" 2>/dev/null)" ] && [ ! -f "$OUT/.made_by_demo_fr5.sh" ]; then
+  echo "demo_fr5.sh: $OUT holds something that this script has not made; move it elsewhere, or name another folder:" >&2
+  echo "  examples/demo_fr5.sh FOLDER" >&2
+  exit 2
+fi
+mkdir -p "$OUT"
+touch "$OUT/.made_by_demo_fr5.sh"
+
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 
 rm -rf "$OUT/correct" "$OUT/mismatched"

@@ -40,5 +40,7 @@ def main(path: Path, scene_id: int, target_id: int) -> None:
 
 
 if __name__ == "__main__":
+    if Path(sys.argv[1]).exists():
+        sys.exit(f"{sys.argv[1]} exists; choose another file, or remove it first")
     numbers = [int(word) for word in sys.argv[2:4]] or [3, 1]
     main(Path(sys.argv[1]), *numbers)

@@ -146,22 +146,27 @@ def lacks_encoding(call):
         return name == "getoutput" or ("encoding" not in named and bool({"text", "universal_newlines"} & set(named)))
     if name in ("read_text", "write_text"):
         return "encoding" not in named
-    if name not in ("open", "NamedTemporaryFile", "fdopen") or ast.unparse(call.func) in (
-        "Image.open",
-        "av.open",
-        "os.open",
-    ):
+    others = ("Image.open", "av.open", "os.open")
+    if name not in ("open", "NamedTemporaryFile", "fdopen") or ast.unparse(call.func) in others:
         return False
     is_path = isinstance(call.func, ast.Attribute) and name == "open"
     mode = named.get("mode") or next(iter(call.args[not is_path :]), None)
     return "encoding" not in named and not (isinstance(mode, ast.Constant) and "b" in str(mode.value))
 
 
-@pytest.mark.parametrize("folder", ["lerobot_excav", "validation", "bench", "docs", "examples", "workflows"])
+@pytest.mark.parametrize("folder", ["lerobot_excav", "validation", "bench", "docs", "examples"])
 def test_texts_name_their_encoding_since_that_of_the_machine_may_lack_characters(folder):
     for path in sorted((ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             assert not (isinstance(node, ast.Call) and lacks_encoding(node)), f"{path}:{node.lineno}"
+
+
+def test_no_module_imports_what_only_some_systems_have():
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) else []
+            assert not {"fcntl", "grp", "msvcrt", "pwd", "resource", "termios", "winreg"} & set(names), path
 
 
 def test_soil_knows_nothing_of_mujoco():

@@ -13,6 +13,7 @@ from lerobot.configs.eval import EvalPipelineConfig
 from lerobot.configs.train import TrainPipelineConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers what the commands name
+from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
 from lerobot_excav.evaluation.result_page.contents import read_contents
 from lerobot_excav.scripts.arguments import parse_arguments
 
@@ -93,12 +94,39 @@ def test_the_page_shows_what_the_stages_make(plan):
     assert {curve.folder for curve in contents.curve} == {str(folder.parent) for folder in curves}
 
 
+@pytest.mark.slow
+def test_the_workflow_stays_out_of_a_folder_that_it_has_not_made(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("years of work")
+    command = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "1", "--config", "out=out"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "out=out holds something that this workflow has not made" in done.stdout + done.stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("script", ["demo.sh", "demo_fr5.sh"])
+def test_a_demo_stays_out_of_a_folder_that_it_has_not_made(tmp_path, script):
+    mine = [tmp_path / "out" / name / "thesis.tex" for name in ("train", "eval", "correct", "mismatched")]
+    for path in mine:
+        path.parent.mkdir(parents=True)
+        path.write_text("years of work")
+    command = ["bash", str(ROOT / "examples" / script), str(tmp_path / "out")]
+    # Without a search path nothing of ours can start.
+    done = subprocess.run(command, cwd=ROOT, env={"PATH": "/usr/bin:/bin"}, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "holds something that this script has not made" in done.stderr
+    assert all(path.exists() for path in mine)
+
+
 def test_the_page_of_the_demo_can_be_read():
     assert read_contents(ROOT / "examples" / "demo_fr5_rows.toml").rows
 
 
 def test_the_landed_page_is_made_of_what_lies_beside_it():
     folder = ROOT / "results" / "fr5_grasp"
+    listed = set(ReportFolder(folder).own)
+    assert listed == {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()} - {LIST}
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=folder / "metrics")
     assert all(contents.metrics_path(row.label).is_file() for row in contents.rows)
     assert all(list(Path(curve.folder).glob("*.jsonl")) for curve in contents.curve)

@@ -1,22 +1,33 @@
-"""The session log: what each recorded episode was, so that its columns can be computed afterwards.
+"""The session log: what happened in each recorded episode, written down as it happens.
 
-`lerobot-record` stores pictures, state and action only. The log adds what a deterministic re-simulation
-needs (`lerobot-excav index` does it): one JSON object per recorded episode,
+`lerobot-record` stores pictures, state and action only, and closes its files at the end: a crash leaves a dataset that
+nobody can read. The log holds what a deterministic simulation needs to repeat every episode, so that `lerobot-excav
+index` can complete a recording, or recover one from a crash. It is JSON Lines, one event a line:
 
-    {"episode_index": 3, "simulation_version": 2, "env": "excavator", "scene_id": 0, "commands": [[0, 3]],
-     "settings": {"task": "Scoop-v0", "fps": 10, "soil": "sand", ...}, "frames": 120, "restarts": []}
+    {"event": "session", "simulation_version": 2, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...}}
+    {"event": "episode", "episode_index": 3, "scene_id": 0, "target_id": 3}
+    {"event": "action", "state": [...], "action": [...]}
+    {"event": "command", "target_id": 1}
+    {"event": "held"}
+    {"event": "restart", "scene_id": 0, "target_id": 3, "state": [...], "action": [...]}
+    {"event": "ended"}
+    {"event": "discarded"}
+    {"event": "stopped"}
 
-`episode_index` is the episode's number in the dataset when it was recorded, `commands` after how many actions which
-target was commanded, `settings` what the simulation was set to, `frames` how many actions were carried out, and
-`restarts` after which of them somebody restarted or changed the scene within the episode, or the machine was held still
-until its mask was found; an episode with restarts cannot be re-simulated from its start.
-
-A line is written when its episode has ended and is not being re-recorded. Where two lines have one
-`episode_index`, the later holds: an interrupted recording that was resumed records that number again. For
-the same reason the last line may name an episode that an interruption kept out of the dataset.
+- `session`: a robot that connected has begun to record; what the simulation is set to.
+- `episode`: an episode begins. `episode_index` is its number in the dataset; what an earlier line says of this number
+  and of higher ones was not kept.
+- `action`: a frame, as LeRobot records it: the state that was observed, and the action that was carried out next, both
+  float32 and exact.
+- `command`: another target is commanded from here on.
+- `held`: before this, the machine was held still until its mask was found.
+- `restart`: the scene was restarted or changed instead of carrying the frame's action out. State and action are null
+  where LeRobot had no frame to record.
+- `ended`: the time for resetting the scene has begun; `discarded`: the episode was thrown away; `stopped`: the
+  recording is over, by an interruption perhaps, and only the dataset tells whether it has kept the episode.
 """
 
-import json
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,6 +35,7 @@ from typing import Any
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.robots.journal import ForeignFileError, Journal
 
 
 def default_path(folder: str, now: datetime) -> Path:
@@ -32,72 +44,105 @@ def default_path(folder: str, now: datetime) -> Path:
 
 
 class SessionLog:
-    """Append the episodes of a recording session to a file; it is made when the first episode has ended."""
+    """Writes down a recording session; between episodes nothing is noted.
+
+    Raises:
+        DeviceError: From every method: the file cannot be written.
+    """
 
     def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings) -> None:
         self.path = path
-        self._common = {
+        self._journal = Journal(path, mark='"event": "session"')
+        self._session: dict[str, Any] = {
+            "event": "session",
             "simulation_version": spec.simulation_version,
             "env": spec.env_type,
             "settings": settings.as_dict(),
         }
-        self._episode: dict[str, Any] | None = None
+        self._is_begun = False  # whether this session's first line is written
+        self._is_running = False  # whether an episode is
+        self._target_id: int | None = None
+
+    def start(self) -> None:
+        """Open the file to append to it; it is made if it is missing."""
+        self._is_begun = self._is_running = False
+        try:
+            self._journal.start()
+        except ForeignFileError as error:
+            raise DeviceError(
+                f"robot.session_log={str(self.path)!r} exists and does not begin like a session log of this version; "
+                "it stays as it is. Give another file."
+            ) from error
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def close(self) -> None:
+        """Close the file; it is removed if it is new and no episode was recorded."""
         self._is_running = False
+        self._journal.close()
 
     def begin(self, episode_index: int, *, scene_id: int, target_id: int) -> None:
-        """Begin an episode; the one before is written unless it had the same number."""
-        if self._episode is not None and self._episode["episode_index"] != episode_index:
-            self.write()
-        self._episode = {
-            "episode_index": episode_index,
-            **self._common,
-            "scene_id": scene_id,
-            "commands": [[0, target_id]],
-            "frames": 0,
-            "restarts": [],
-        }
-        self._is_running = True
+        """Begin an episode."""
+        if not self._is_begun:
+            self._write(self._session)
+        self._is_begun = self._is_running = True
+        self._target_id = target_id
+        start = {"episode_index": episode_index, "scene_id": scene_id, "target_id": target_id}
+        self._write({"event": "episode", **start})
 
-    def count_frame(self, target_id: int | None) -> None:
-        """Count an action of the episode, after which a target is commanded; between episodes, count nothing."""
-        if not self._is_running or self._episode is None:
+    def note_action(self, state: Sequence[float], action: Sequence[float], target_id: int | None) -> None:
+        """Note a frame whose action was carried out, after which a target is commanded."""
+        if not self._is_running:
             return
-        self._episode["frames"] += 1
-        commands = self._episode["commands"]
-        if target_id is not None and target_id != commands[-1][1]:
-            commands.append([self._episode["frames"], target_id])
+        events: list[dict[str, Any]] = [{"event": "action", "state": state, "action": action}]
+        if target_id not in (None, self._target_id):
+            self._target_id = target_id
+            events.append({"event": "command", "target_id": target_id})
+        self._write(*events)
 
-    def note_restart(self) -> None:
-        """Note that the scene was restarted or changed within the episode, if one is running."""
-        if self._is_running and self._episode is not None:
-            self._episode["restarts"].append(self._episode["frames"])
+    def note_held(self) -> None:
+        """Note that the machine was held still until its mask was found."""
+        if self._is_running:
+            self._write({"event": "held"})
 
-    def pause(self) -> None:
+    def note_restart(
+        self, state: Sequence[float] | None, action: Sequence[float] | None, *, scene_id: int, target_id: int
+    ) -> None:
+        """Note that a scene was started within the episode, and the frame in which that was asked for."""
+        if self._is_running:
+            self._target_id = target_id
+            start = {"scene_id": scene_id, "target_id": target_id}
+            self._write({"event": "restart", **start, "state": state, "action": action})
+
+    def end(self) -> None:
         """Note that the episode has ended; it may still be discarded."""
-        self._is_running = False
+        self._finish("ended")
+
+    def stop(self) -> None:
+        """Note that the recording is over."""
+        self._finish("stopped")
 
     def discard(self) -> None:
-        """Forget the episode that has ended."""
-        self._episode, self._is_running = None, False
+        """Note that the episode that ran last is not kept."""
+        self._is_running = False
+        if self._is_begun:
+            self._write({"event": "discarded"})
 
-    def write(self) -> None:
-        """Append the episode, if there is one.
+    def _finish(self, event: str) -> None:
+        if self._is_running:
+            self._write({"event": event})
+        self._is_running = False
 
-        Raises:
-            DeviceError: The file cannot be written.
-        """
-        if self._episode is None:
-            return
-        # What was commanded after the last action was never obeyed, nor shown in a frame.
-        commands, frames = self._episode["commands"], self._episode["frames"]
-        self._episode["commands"] = [commands[0], *(change for change in commands[1:] if change[0] < frames)]
+    def _write(self, *events: dict[str, Any]) -> None:
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(self._episode) + "\n")
+            self._journal.write(*events)
         except OSError as error:
-            raise DeviceError(
-                f"robot.session_log={str(self.path)!r} cannot be written ({error.strerror}); give a file in "
-                "a folder of your own. Without it `lerobot-excav index` cannot complete this recording."
-            ) from error
-        self.discard()
+            self._is_running = False
+            raise self._failure(error) from error
+
+    def _failure(self, error: OSError) -> DeviceError:
+        return DeviceError(
+            f"robot.session_log={str(self.path)!r} cannot be written ({error.strerror}); give a file in a folder of "
+            "your own, on a disk with room. Without it `lerobot-excav index` can neither complete nor recover this "
+            "recording."
+        )

@@ -70,7 +70,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             on_episode=self._begin_episode,
             on_pause=self._end_episode,
             on_discard=self._discard_episode,
-            on_stop=self._log.write,
+            on_stop=self._log.stop,
         )
 
     def make_env(self) -> MaskedTaskEnv[Any, Any]:
@@ -131,24 +131,27 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         """Start the simulation at the first scene and target.
 
         Raises:
-            DeviceError: The robot is connected already.
+            DeviceError: The robot is connected already, or its session log cannot be written.
             MaskMissingError: No mask is found for the first target; the robot stays disconnected.
         """
         if self._env is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
-        self._env = self.make_env()
+        self._log.open()
         self._order = self._make_order()
         try:
+            self._env = self.make_env()
             self.start_scene()
         except Exception:
-            self._env.close()
+            if self._env is not None:
+                self._env.close()
             self._env = None
+            self._log.close()
             raise
         logging.getLogger().addHandler(self._phases)
         self.connected.add(self)
 
     def disconnect(self) -> None:
-        """Stop the simulation and complete the session log.
+        """Stop the simulation and close the session log.
 
         Raises:
             DeviceError: The robot is not connected.
@@ -158,7 +161,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self.connected.discard(self)
         logging.getLogger().removeHandler(self._phases)
         env.close()
-        self._log.write()
+        self._log.close()
 
     def get_observation(self) -> dict[str, Any]:
         """Return the current state and pictures; a second call without an action returns the same.
@@ -167,10 +170,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             DeviceError: The robot is not connected.
         """
         _ = self.env
-        state = self._observation["agent_pos"].tolist()
         pixels = self._observation["pixels"]
         return {
-            **dict(zip(self.task_spec.state_names, state, strict=True)),
+            **dict(zip(self.task_spec.state_names, self._state, strict=True)),
             **{camera: pixels[camera].copy() for camera in self.cameras},
         }
 
@@ -189,23 +191,25 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         env, names = self.env, self.task_spec.action_names
         if self._drives_home(action):
             if not self._is_homing:
-                self.restart_scene()
+                self._restart_scene(action)
             self._is_homing = True
             return dict(action)
         if is_pressed(action, NEXT_SCENE):
             self._order.press()
-            self.restart_scene()
+            self._restart_scene(action)
             return dict(action)
         if is_pressed(action, REINITIALISE):
-            self.restart_scene()
+            self._restart_scene(action)
             return dict(action)
+        wanted, state = command_from_action(action, names), self._state
         limits = self.task_spec.action_low, self.task_spec.action_high
-        command = np.clip(command_from_action(action, names), *limits).astype(np.float32)
+        command = np.clip(wanted, *limits).astype(np.float32)
         self._observation, *_, info = env.step(command)
         self._is_homing = False
-        self._log.count_frame(info.get("target_id"))
+        # LeRobot records the action as it came.
+        self._log.note_action(state, wanted.tolist(), info.get("target_id"))
         if info["mask_missing_frames"] > self._held_frames:
-            self._log.note_restart()  # the machine was held still: actions alone do not lead here
+            self._log.note_held()
         self._held_frames = info["mask_missing_frames"]
         self._require_mask(info)
         return dict(zip(names, command.tolist(), strict=True))
@@ -223,11 +227,6 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             raise DeviceError("this robot offers no depth image; set --robot.depth=true.")
         return self.env.depth_m()
 
-    def restart_scene(self) -> None:
-        """Start the current scene again; within a recorded episode the session log notes it."""
-        self._log.note_restart()
-        self.start_scene()
-
     def start_scene(self) -> None:
         """Reset the environment to the current scene and target."""
         options = {"scene_id": self.scene_id, "target_id": self.target_id}
@@ -243,11 +242,26 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self.start_scene()
         self._log.begin(episode_index, scene_id=self.scene_id, target_id=self.target_id)
         if self._held_frames:
-            self._log.note_restart()
+            self._log.note_held()
+
+    @property
+    def _state(self) -> list[float]:
+        """What is felt of the machine now."""
+        state: list[float] = self._observation["agent_pos"].tolist()
+        return state
+
+    def _restart_scene(self, action: Mapping[str, Any]) -> None:
+        """Start the current scene, which may be another one now, instead of carrying an action out."""
+        names = self.task_spec.action_names
+        state, wanted = None, None
+        if all(name in action for name in names):  # else LeRobot has no frame to record
+            state, wanted = self._state, command_from_action(action, names).tolist()
+        self._log.note_restart(state, wanted, scene_id=self.scene_id, target_id=self.target_id)
+        self.start_scene()
 
     def _end_episode(self) -> None:
         self._order.end()
-        self._log.pause()
+        self._log.end()
 
     def _discard_episode(self) -> None:
         self._order.discard()

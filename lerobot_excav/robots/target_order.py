@@ -102,8 +102,8 @@ def logged_starts(path: Path) -> dict[int, Start]:
     for line in lines:
         try:
             episode = json.loads(line)
-            target_id = episode["target_id"] if "target_id" in episode else episode["commands"][0][1]
-            starts[episode["episode_index"]] = episode["scene_id"], target_id
+            if episode["event"] == "episode":
+                starts[episode["episode_index"]] = episode["scene_id"], episode["target_id"]
         except (ValueError, TypeError, LookupError):
             continue  # `lerobot-excav index` says what is wrong with it
     return starts

@@ -37,7 +37,7 @@ class BenchArguments(WorkArguments, PlayedScenes):
     scenes: int = with_default(PlayedScenes, "scenes", 3)
 
     only: str | None = setting("What to measure; left out: everything", default=None, choices=MEASURES)
-    json: Path | None = setting("File to which the numbers go as well", default=None)
+    json: Path | None = setting("File to which the numbers go as well; must not exist", default=None)
 
 
 def run(arguments: BenchArguments) -> int:

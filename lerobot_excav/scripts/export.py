@@ -28,7 +28,7 @@ class ExportArguments(Arguments):
     POSITIONAL: ClassVar[str] = "checkpoint"
 
     checkpoint: Path | None = setting("pretrained_model folder of a run of lerobot-train", default=None)
-    out: Path | None = setting("Folder to write", default=None)
+    out: Path | None = setting("Folder to write; must not exist", default=None)
     title: str = setting("Heading of the card", default="mask_act")
     env: str = setting(
         "Environment in the card's command, as in --env.type", default="excavator", choices=lambda: tuple(env_types())

@@ -1,6 +1,7 @@
 """What to do about an error of the file system."""
 
 import errno
+import re
 
 _FULL = (
     "free some space there, or write elsewhere. What was finished is kept; "
@@ -30,7 +31,7 @@ _ADVICE = {
 def in_words(error: OSError) -> str:
     """Return what happened to which file, and what to do."""
     place = f"{error.filename}: " if error.filename is not None else ""
-    # An error of a library may carry its number in its words only.
-    number = error.errno if error.errno is not None else next((n for n in _ADVICE if f"errno {n}]" in str(error)), None)
+    said = re.search(r"\[errno (\d+)\]", str(error), re.IGNORECASE)  # where a library gives the number in words only
+    number = error.errno if error.errno is not None else int(said[1]) if said else None
     advice = f"; {_ADVICE[number]}" if number in _ADVICE else ""
     return f"{place}{error.strerror or error}{advice}"

@@ -8,6 +8,8 @@ Examples:
       rebuild; list scenes with missing or duplicate targets
   lerobot-excav index outputs/recorded --session=outputs/excavator_sim_sessions/2026-01-31_10-00-00.jsonl
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
+  lerobot-excav index outputs/recorded --session=outputs/session.jsonl --recover
+      after a crash of lerobot-record: play every finished episode again, and write a dataset that can be read
   lerobot-excav index outputs/paired --split=scene --eval_fraction=0.2
       hold out a fifth of the scenes, with all their episodes
   lerobot-train ... --eval_steps=500 \
@@ -39,6 +41,14 @@ class IndexArguments(DatasetArguments):
     session: Path | None = setting("Session log of the simulated robot: add the excav.* columns first", default=None)
     out: Path | None = setting("With a session: put the completed dataset here, and keep the recording", default=None)
     skip_restarted: bool = setting("With a session: leave out episodes in which the scene was restarted", default=False)
+    recover: bool = setting(
+        "With a session: write the dataset again after a crash, pictures included, instead of completing it; the "
+        "damaged files are kept beside it",
+        default=False,
+    )
+    task: str | None = setting(
+        "With --recover: task text where none can be read; left out: the description of the task", default=None
+    )
     select: str = setting("Composition of the episodes to train on", default="all", choices=COMPOSITIONS)
     episodes: int | None = setting("How many episodes; left out: as many as there are", default=None, low=1)
     scenes: int | None = setting("How many scenes, for paired and non-paired", default=None, low=1)
@@ -57,6 +67,8 @@ def run(arguments: IndexArguments) -> int:
 
     _require_options_with_effect(arguments)
     root = arguments.root
+    if arguments.recover:
+        return _recover(arguments)
     if arguments.session is not None:
         from lerobot_excav.datasets.complete.resimulation import complete_recording
 
@@ -71,8 +83,19 @@ def run(arguments: IndexArguments) -> int:
 
 
 def _require_options_with_effect(arguments: IndexArguments) -> None:
-    for option, given in (("--out", arguments.out is not None), ("--skip_restarted", arguments.skip_restarted)):
+    with_session = {
+        "--out": arguments.out is not None,
+        "--skip_restarted": arguments.skip_restarted,
+        "--recover": arguments.recover,
+    }
+    for option, given in with_session.items():
         require(not given or arguments.session is not None, f"{option} is of use with --session only")
+    require(arguments.task is None or arguments.recover, "--task is of use with --recover only")
+    others = arguments.skip_restarted or arguments.seed is not None or arguments.eval_fraction is not None
+    require(
+        not arguments.recover or not (others or _asks_for_episodes(arguments)),
+        "--recover only writes the dataset again; complete it afterwards, with --session and without --recover",
+    )
     require(
         arguments.eval_fraction is None or arguments.split is not None,
         f"--eval_fraction={arguments.eval_fraction} has no effect without --split; add --split=scene",
@@ -82,6 +105,24 @@ def _require_options_with_effect(arguments: IndexArguments) -> None:
         arguments.seed is None or chooses,
         f"--seed={arguments.seed} has no effect without a choice; add --select, --episodes or --split",
     )
+
+
+def _recover(arguments: IndexArguments) -> int:
+    from lerobot_excav.datasets.complete.recovery import recover_recording
+
+    assert arguments.session is not None  # checked before
+    recovery = recover_recording(arguments.root, arguments.session, out=arguments.out, task=arguments.task)
+    print(f"{recovery.root}: {recovery.episodes} episodes recovered; task: {', '.join(map(repr, recovery.texts))}")
+    if recovery.lost is not None:
+        print(f"episode {recovery.lost} was not finished, and is left out")
+    if recovery.aside is not None:
+        print(f"the damaged files are in {recovery.aside}; remove that folder when you do not need it any more")
+    print(
+        f"go on recording with lerobot-record --resume=true and --robot.session_log={arguments.session}, or complete "
+        f"the dataset:\n  lerobot-excav index {arguments.root if arguments.out is None else arguments.out} "
+        f"--session={arguments.session}"
+    )
+    return 0
 
 
 def _asks_for_episodes(arguments: IndexArguments) -> bool:

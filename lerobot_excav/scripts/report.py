@@ -42,7 +42,9 @@ class ReportArguments(Arguments):
     rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
     metrics_folder: Path | None = setting("With --rows: folder of the metrics in place of the file's", default=None)
     operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
-    out: Path | None = setting("Folder for report.md and report.json", default=None)
+    out: Path | None = setting(
+        "Folder for report.md and report.json; replaces nothing but earlier reports", default=None
+    )
     seed: int = setting("Seed of the bootstrap", default=0, low=0)
 
 

@@ -1,133 +1,36 @@
-"""Every field of every configuration takes what its page allows, and refuses anything else by name, at once.
+"""Every field of every configuration takes what its page allows, and refuses anything else by name, at once."""
 
-Whether a value is harmful is told before it is tried, by the rules below: they are written from what the pages say of a
-field, and know nothing of the code that checks it.
-"""
-
-import contextlib
 import dataclasses
-import importlib
 import math
-import signal
-from pathlib import Path
-from typing import Any, NamedTuple
 
 import draccus
-import numpy as np
 import pytest
 from draccus.cfgparsing import parse_string
-from draccus.utils import DraccusException
-from lerobot.configs import FeatureType, NormalizationMode, PolicyFeature
 
-from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
-from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
-from lerobot_excav.envs.soil.parameters import SoilParameters
-from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.result_page.contents import read_contents
-from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
-from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
-from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.scripts.arguments import parse_arguments
 from lerobot_excav.scripts.main import COMMANDS
-from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
-from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
-from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
 
-ENDLESS, SEED = 2**31 - 1, 2**63 - 1
-CPU_LIMIT_S = 2.0
-
-POOL = {
-    **{"none": None, "true": True, "false": False, "0": 0, "1": 1, "2": 2, "4": 4, "10": 10, "-1": -1, "0.0": 0.0},
-    **{"-0.0": -0.0, "0.5": 0.5, "-0.5": -0.5, "2.5": 2.5, "1e-9": 1e-9, "1e300": 1e300, "-1e300": -1e300},
-    **{"nan": math.nan, "inf": math.inf, "-inf": -math.inf, "10^12": 10**12, "2^63": 2**63, "10^5000": 10**5000},
-    **{"-10^5000": -(10**5000), "empty": "", "typo": "typo", "text of a number": "1", "text of nan": "nan"},
-    **{"bytes": b"x", "list": [], "list of a number": [1], "list of a text": ["a"], "list of nan": [math.nan]},
-    **{
-        "list of a list": [[1]],
-        "map": {},
-        "map to a number": {"a": 1},
-        "tuple": (1, 2),
-        "set": {1},
-        "object": object(),
-    },
-    **{
-        "path": Path("x"),
-        "NUL": "a\0b",
-        "NumPy 4": np.int64(4),
-        "NumPy nan": np.float32("nan"),
-        "NumPy true": np.True_,
-    },
-    **{"array": np.array([1, 2]), "complex": 1j, "type": int},
-}
-
-
-class Rule(NamedTuple):
-    """What a field may hold."""
-
-    allows: Any  # tells whether a value is harmless
-    examples: tuple[Any, ...] = ()  # values near the limits
-    needs: dict[str, Any] = {}  # noqa: RUF012 - other fields, without which it has no meaning
-    is_text: bool = False  # whether the command line takes any text
-
-    def beside(self, **needs):
-        return self._replace(needs=needs)
-
-
-def is_whole(value):
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def whole(low, high=SEED, only=None):
-    return Rule(
-        lambda v: is_whole(v) and low <= v <= high and (only is None or v in only), (low - 1, low, high, high + 1)
-    )
-
-
-def number(low=-math.inf, high=math.inf, *, above=-math.inf, below=math.inf):
-    def allows(value):
-        if not is_whole(value) and not (isinstance(value, float | np.floating) and math.isfinite(value)):
-            return False
-        return max(low, -1.7e308) <= value <= min(high, 1.7e308) and above < value < below
-
-    finite = [edge for edge in (low, high, above, below) if math.isfinite(edge)]
-    return Rule(allows, tuple(near for edge in finite for near in (edge, edge - 1e-6, edge + 1e-6)))
-
-
-def one_of(*values):
-    return Rule(lambda v: isinstance(v, str) and v in values, values)
-
-
-def optional(rule):
-    return rule._replace(allows=lambda v: v is None or rule.allows(v))
-
-
-def each(rule):
-    return Rule(lambda v: isinstance(v, list | tuple) and all(map(rule.allows, v)), tuple([e] for e in rule.examples))
-
-
-def numbered(*names):
-    """Names, each with a number of its own on a device."""
-
-    def allows(value):
-        is_map = isinstance(value, dict) and set(value) == set(names)
-        return is_map and len(set(value.values())) == len(names) and all(map(whole(0, 255).allows, value.values()))
-
-    right = {name: place for place, name in enumerate(names)}
-    first = names[0]
-    wrong = [{**right, first: bad} for bad in (-1, math.nan, "1", True, 1, 10**9)]
-    return Rule(allows, (right, {first: 0}, {**right, "typo": 9}, *wrong))
-
-
-flag = Rule(lambda v: isinstance(v, bool))
-text = Rule(lambda v: isinstance(v, str) and v != "", is_text=True)
-path = Rule(lambda v: isinstance(v, str | Path) and str(v) != "" and "\0" not in str(v), is_text=True)
-never = Rule(lambda v: v is None)
-feature_name = Rule(
-    lambda v: isinstance(v, str) and v.startswith("observation.") and len(v) > 12 and " " not in v,
-    ("observation.images.x", "observation.", "images.x", "observation.images.x y"),
+from . import field_rules
+from .field_rules import (
+    COMMAND_TABLES,
+    CONFIGURATIONS,
+    DERIVED,
+    ENDLESS,
+    LEROBOTS_OWN,
+    POOL,
+    Rule,
+    each,
+    number,
+    one_of,
+    path,
+    problem,
+    problems,
+    text,
+    whole,
 )
+<<<<<<< HEAD
 device = Rule(
     lambda v: v in ("cpu", "cuda", "cuda:0", "mps", "xpu") if isinstance(v, str) else False, ("cpu", "cuda:x", "gpu")
 )
@@ -383,6 +286,8 @@ def problems(kind, table, base):
             if wrong is not None:
                 found.append(f"{name} = {label}: {wrong}")
     return found
+=======
+>>>>>>> main
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
@@ -559,8 +464,8 @@ def refuse(message):
     ],
 )
 def test_a_planted_fault_is_found(monkeypatch, take, found):
-    monkeypatch.setattr(f"{__name__}.CPU_LIMIT_S", 0.1)
+    monkeypatch.setattr(field_rules, "CPU_LIMIT_S", 0.1)
     pool = {label: POOL[label] for label in ("1", "nan")}
-    monkeypatch.setattr(f"{__name__}.POOL", pool)
+    monkeypatch.setattr(field_rules, "POOL", pool)
     table = {"size": Rule(whole(0, 9).allows)}
     assert any(line.startswith(found) for line in problems(faulty(take), table, {}))

@@ -87,9 +87,9 @@ def test_a_resumed_recording_that_its_session_log_does_not_hold_is_refused(
     make_robot, tmp_path, lines, settings, message
 ):
     if lines is not None:
-        line = {"scene_id": 0, "target_id": 0, "commands": [[0, 0]]}
+        line = {"event": "episode", "scene_id": 0, "target_id": 0}
         texts = [json.dumps(line | {"episode_index": each}) if isinstance(each, int) else each for each in lines]
-        (tmp_path / "session.jsonl").write_text("\n".join(texts))
+        (tmp_path / "session.jsonl").write_text("\n".join(['{"event": "session"}', *texts]))
     make_robot(**settings)
     with pytest.raises(ConfigurationError, match=message):
         logging.info("Recording episode 2")

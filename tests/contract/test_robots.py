@@ -133,13 +133,13 @@ def test_the_session_log_tells_settings_and_commands(make_robot, still, caplog):
     robot = make_robot(mask_noise="dilate", mask_noise_px=2, target_id=1)
     with caplog.at_level(logging.INFO):
         logging.info("Recording episode 0")  # as lerobot-record says when it begins
-    for target_id in (1, 1, 3, 3):
+    for target_id in (1, 1, 3, 3):  # the fourth action is the first that follows the change
         robot.env.target_id = target_id
         robot.send_action(still)
     path = robot.config.session_log
     robot.disconnect()
     (episode,) = read_session(path).values()
-    assert episode.commands == [[0, 1], [3, 3]]
+    assert (episode.pair.target_id, episode.schedule) == (1, ((3, 3),))
     assert episode.task_settings == robot.settings
     assert (episode.env, episode.frames) == (robot.task_spec.env_type, 4)
     assert episode.simulation_version == robot.task_spec.simulation_version

@@ -2,9 +2,13 @@
 
 import toy_reach.env
 from lerobot.datasets import LeRobotDataset
+from toy_reach.spec import REACH
 
+from lerobot_excav.datasets.format.episode_table import iterate_episodes
+from lerobot_excav.datasets.format.schema import ACTION_KEY, PAIR_KEY, SCENE_KEY, STATE_KEY, TARGET_KEY
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
+from lerobot_excav.robots.session_log import SessionLog
 
 STATE, MAIN, MASK = "observation.state", "observation.images.main", "observation.images.target_mask"
 SMALL = {"observation_height": 32, "observation_width": 48}
@@ -35,3 +39,17 @@ def command_next_spot(patch):
 def load(root, episodes=None):
     """Open a dataset by LeRobot's own class."""
     return LeRobotDataset(f"local/{root.name}", root=root, episodes=episodes, video_backend="pyav")
+
+
+def write_session(dataset, path, env=None, episodes=None):
+    """Write the session log of a robot that recorded a dataset."""
+    log = SessionLog(path, REACH, toy_settings(env=env).env)
+    log.start()
+    keys = (PAIR_KEY, SCENE_KEY, TARGET_KEY, STATE_KEY, ACTION_KEY)
+    for episode in iterate_episodes(dataset, keys, episodes=episodes):
+        log.begin(episode.index, scene_id=episode.pair.scene_id, target_id=episode.pair.target_id)
+        targets = [*episode.target_id[1:], episode.target_id[-1]]
+        for state, action, target_id in zip(episode.state, episode.action, targets, strict=True):
+            log.note_action(state.tolist(), action.tolist(), int(target_id))
+        log.end()
+    log.close()

@@ -31,6 +31,65 @@ def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, scoop_li
     assert [episode.retained_mass_kg for episode in evaluation.episodes.values()] == [2.0, 2.0]
 
 
+def log_of(path, scoop_line, n_envs=1):
+    """A metrics log, and a function that ends its next batch in scenes from a number on."""
+    log = MetricsLog(path, n_envs=n_envs)
+
+    def play(first):
+        log.begin_batch(range(first, first + n_envs))
+        for i in range(n_envs):
+            metrics = {k: v for k, v in scoop_line(first + i).items() if k not in ("episode_ix", "seed")}
+            log.finish_episode(i, {"episode_metrics": metrics})
+
+    return play
+
+
+def scenes(path):
+    return [key.scene_id for key in read_evaluation(path).episodes]
+
+
+@pytest.mark.parametrize(
+    "order",
+    ["abab", "abba", "aba", "abaaa", "baaaab", "aabbba"],
+)
+def test_evaluations_that_wrote_at_the_same_time_are_not_mixed(tmp_path, scoop_line, order, caplog):
+    path = tmp_path / "metrics.jsonl"
+    logs = {name: log_of(path, scoop_line) for name in "ab"}
+    for number, name in enumerate(order):
+        logs[name](1000 + number)
+    assert "is being written by another evaluation as well" in caplog.text
+    with pytest.raises(
+        DatasetError, match=r"wrote into \S* at the same time.* grep '\"evaluation\": \"\w+\"'"
+    ) as error:
+        read_evaluation(path)
+    # The command in the message leaves one of them.
+    key = str(error.value).split("grep '")[1].split("'")[0]
+    (tmp_path / "one.jsonl").write_text("".join(x for x in path.read_text().splitlines(keepends=True) if key in x))
+    name = order[-1] if key in path.read_text().splitlines()[-1] else "ab".replace(order[-1], "")
+    assert scenes(tmp_path / "one.jsonl") == [1000 + i for i, each in enumerate(order) if each == name]
+
+
+def test_evaluations_one_after_the_other_stay_apart_also_where_the_first_batch_is_missing(tmp_path, scoop_line, caplog):
+    path = tmp_path / "metrics.jsonl"
+    for first in (1000, 2000):
+        play = log_of(path, scoop_line, n_envs=2)
+        play(first)
+        play(first + 2)
+    assert scenes(path) == [2000, 2001, 2002, 2003]
+    assert read_evaluation(path).of == 2
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:4] + lines[6:]))
+    assert scenes(path) == [2002, 2003]
+    assert not caplog.text
+
+
+@pytest.mark.parametrize("order", [(0, 0, 1, 1, 2, 2), (0, 1, 2, 2, 3), (0, 1, 3, 2)])
+def test_mixed_lines_of_earlier_versions_are_refused(metrics_file, scoop_line, order):
+    lines = [scoop_line(number, episode_ix=ix) for number, ix in enumerate(order)]
+    with pytest.raises(DatasetError, match="at the same time; give each a metrics_path of its own"):
+        read_evaluation(metrics_file("m.jsonl", lines))
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -67,11 +126,17 @@ def test_a_missing_field_is_named(metrics_file, scoop_line, name):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [(None, r"--env\.metrics_path"), ("", "empty"), ("{", "not JSON"), ("3", "the whole=3: input should be an obj")],
+    [
+        ("\udcff\udcfe", "not a metrics file"),
+        (None, r"--env\.metrics_path"),
+        ("", "empty"),
+        ("{", "not JSON"),
+        ("3", "the whole=3: input should be an obj"),
+    ],
 )
 def test_a_missing_or_damaged_file_is_refused(tmp_path, text, message):
     if text is not None:
-        (tmp_path / "m.jsonl").write_text(text)
+        (tmp_path / "m.jsonl").write_text(text, errors="surrogateescape")
     with pytest.raises(DatasetError, match=message):
         read_evaluation(tmp_path / "m.jsonl")
 

@@ -75,6 +75,56 @@ def test_an_interrupted_run_continues_to_the_same_file(tmp_path):
 
 
 @pytest.mark.usefixtures("still")
+@pytest.mark.parametrize("text", ["years of work", "years\nof work\n", '{"episode_ix": 0}\n', "3\n", "[]\n", "\n"])
+def test_a_file_that_no_run_has_made_is_kept(tmp_path, text):
+    mine = tmp_path / "o.jsonl.partial"
+    mine.write_text(text)
+    with pytest.raises(DatasetError, match=r"o\.jsonl\.partial holds something else .* choose another --metrics"):
+        evaluate(tmp_path / "o.jsonl", resume=True)
+    assert mine.read_text() == text
+
+
+@pytest.mark.usefixtures("still")
+def test_episodes_beyond_those_asked_for_are_kept(tmp_path):
+    evaluate(tmp_path / "o.jsonl.partial")
+    before = (tmp_path / "o.jsonl.partial").read_text()
+    with pytest.raises(ConfigurationError, match="holds 3 episodes, and 2 are asked for"):
+        evaluate(tmp_path / "o.jsonl", settings=played(scenes=2), resume=True)
+    assert (tmp_path / "o.jsonl.partial").read_text() == before
+
+
+@pytest.mark.usefixtures("still")
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_second_process_is_kept_away(tmp_path, monkeypatch, resume):
+    def second(*_, **__):
+        with pytest.raises(DatasetError, match=r"another process is at work on \S*o\.jsonl\.partial"):
+            evaluate(tmp_path / "o.jsonl", resume=resume)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(operator_run, "play_demonstration", second)
+        with pytest.raises(KeyboardInterrupt):
+            evaluate(tmp_path / "o.jsonl")
+    evaluate(tmp_path / "o.jsonl", resume=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["o.json", "o.jsonl"]
+
+
+@pytest.mark.usefixtures("still")
+def test_a_file_that_appeared_meanwhile_is_kept(tmp_path, monkeypatch):
+    play = operator_run.play_demonstration
+
+    def write_too(*arguments, **options):
+        (tmp_path / "o.jsonl").write_text("mine")
+        return play(*arguments, **options)
+
+    monkeypatch.setattr(operator_run, "play_demonstration", write_too)
+    with pytest.raises(DatasetError, match="exists"):
+        evaluate(tmp_path / "o.jsonl")
+    assert (tmp_path / "o.jsonl").read_text() == "mine"
+    assert len((tmp_path / "o.jsonl.partial").read_text().splitlines()) == 3
+
+
+@pytest.mark.usefixtures("still")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

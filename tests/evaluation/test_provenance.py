@@ -64,7 +64,7 @@ def test_a_record_grows_with_its_file(evaluation):
     assert after["seconds"] >= before["seconds"]
 
 
-@pytest.mark.parametrize("content", ['{"mine": 1}', "{"])
+@pytest.mark.parametrize("content", ['{"mine": 1}', '{"packages": {}, "name": "of npm"}', "{", "3", "[]"])
 def test_what_is_not_a_record_is_kept(tmp_path, caplog, content):
     (tmp_path / "m.json").write_text(content)
     write_provenance(tmp_path / "m.jsonl")

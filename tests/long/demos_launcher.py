@@ -15,7 +15,6 @@ def run(options, played, log):
     from lerobot_excav.datasets.record import simulation
     from lerobot_excav.scripts.main import main
 
-    os.setsid()
     for stream in (1, 2):
         os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
     play = simulation.play_demonstration
@@ -34,6 +33,7 @@ def serve():
         import_module(name)
     for line in sys.stdin:
         child = os.fork()
+        os.setpgid(child, child)  # in both: whichever comes first
         if not child:
             code = 70
             try:

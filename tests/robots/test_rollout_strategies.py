@@ -4,7 +4,6 @@ These tests would notice if a new version of LeRobot announced its phases in oth
 configuration otherwise.
 """
 
-import json
 import logging
 import signal
 import sys
@@ -15,6 +14,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.rollout.strategies import dagger, highlight, sentry
 from lerobot.scripts import lerobot_rollout
 
+from lerobot_excav.datasets.complete.session import read_session
 from lerobot_excav.robots.simulated_robot import SimulatedRobot
 from lerobot_excav.scripts import main
 
@@ -79,14 +79,15 @@ def lengths_of(tmp_path):
 
 def logged(tmp_path):
     path = tmp_path / "session.jsonl"
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    return list(read_session(path).values()) if path.exists() else []
 
 
 def assert_completed(tmp_path):
     """The session log describes every episode, so its columns can be added."""
-    lengths, lines = lengths_of(tmp_path), logged(tmp_path)[: len(lengths_of(tmp_path))]
-    assert [line["frames"] for line in lines] == lengths
-    assert [line["commands"][0][1] for line in lines] == [index % 4 for index in range(len(lengths))]
+    lengths = lengths_of(tmp_path)
+    episodes = logged(tmp_path)[: len(lengths)]
+    assert [episode.frames for episode in episodes] == lengths
+    assert [episode.pair.target_id for episode in episodes] == [index % 4 for index in range(len(lengths))]
     assert main.main(["index", str(tmp_path / "data"), f"--session={tmp_path / 'session.jsonl'}"]) == 0
 
 

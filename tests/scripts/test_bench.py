@@ -18,6 +18,13 @@ def test_everything_is_measured_and_written(tmp_path, capsys):
     assert {each["unit"] for each in written} == {"steps/s", "x real time", "frames/s", "episodes/min"}
 
 
+def test_a_file_that_exists_is_kept_and_named_before_anything_is_measured(tmp_path, capsys):
+    (tmp_path / "mine.json").write_text("years of work")
+    assert main([*TOY, f"--json={tmp_path / 'mine.json'}"]) == 2
+    assert "mine.json exists; choose another file, or remove it first" in capsys.readouterr().err
+    assert (tmp_path / "mine.json").read_text() == "years of work"
+
+
 def test_options_reach_the_measurements(monkeypatch):
     asked = []
 

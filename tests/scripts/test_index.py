@@ -63,11 +63,18 @@ def test_the_seed_reaches_the_split(paired_dataset, output):
     assert len(texts) > 1
 
 
+@pytest.mark.parametrize("other", ["--flags", "--skip_restarted", "--select=paired", "--seed=3"])
+def test_recovery_does_nothing_else(paired_dataset, output, other):
+    assert "--recover only writes the dataset again" in output(paired_dataset, "--session=s", "--recover", other)
+
+
 @pytest.mark.parametrize(
     ("option", "message"),
     [
         ("--out=x", "--out is of use with --session only"),
         ("--skip_restarted", "--skip_restarted is of use with --session only"),
+        ("--recover", "--recover is of use with --session only"),
+        ("--task=go", "--task is of use with --recover only"),
         ("--eval_fraction=0.3", "--eval_fraction=0.3 has no effect without --split"),
         ("--seed=0", "--seed=0 has no effect without a choice"),
     ],

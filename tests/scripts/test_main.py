@@ -1,6 +1,10 @@
+import errno
+import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
+from unittest.mock import Mock
 
 import pytest
 
@@ -43,7 +47,11 @@ def test_an_error_is_one_line_and_exit_code_2(capsys, tmp_path):
     (tmp_path / "file").write_text("")
     for folder, problem in (
         (tmp_path, f"{tmp_path} is not a LeRobot dataset: it has no meta/info.json"),
-        (tmp_path / "file", f"{tmp_path / 'file/meta/info.json'}: Not a directory"),
+        (
+            tmp_path / "file",
+            f"{tmp_path / 'file/meta/info.json'}: Not a directory; "
+            "check the path; a part of it is a file, not a folder",
+        ),
     ):
         assert main(["qc", str(folder)]) == 2
         assert capsys.readouterr().err == f"lerobot-excav qc: {problem}\n"
@@ -62,6 +70,37 @@ def test_ctrl_c_and_errors_of_this_package_have_their_own_codes(monkeypatch, cap
     monkeypatch.setattr(report, "run", fail)
     assert main(["report", "x"]) == code
     assert capsys.readouterr().err.strip() == f"lerobot-excav report: {text}"
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"),
+    [
+        (errno.ENOSPC, r"free some space there, or write elsewhere\. What was finished is kept; .* --resume=true"),
+        (errno.EDQUOT, "free some space"),
+        (errno.EROFS, "choose a place where you may read and write"),
+        (errno.EACCES, "choose a place where you may read and write"),
+        (errno.ENOENT, "check the path"),
+        (errno.EMFILE, "ulimit -n"),
+        (errno.EIO, "the disk or the network drive fails"),
+    ],
+)
+def test_an_error_of_the_disk_names_the_file_and_what_to_do(monkeypatch, capsys, number, advice):
+    errors = [OSError(number, os.strerror(number), "out/a.json"), OSError(f"[Errno {number}] out/a.json: cannot write")]
+    for error in errors:
+        monkeypatch.setattr(report, "run", Mock(side_effect=error))
+        assert main(["report", "x"]) == 2
+        assert re.fullmatch(rf"lerobot-excav report: .*out/a\.json: .*{advice}.*\n", capsys.readouterr().err)
+
+
+def test_where_a_machine_has_ascii_only_texts_are_still_read_and_printed(tmp_path):
+    rows = tmp_path / "rows.toml"
+    text = f'title = "5 – 7 × ±"\nmetrics = "{tmp_path}"\n[[section]]\ntitle = "ü"\n'
+    rows.write_text(text, encoding="utf-8")
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+    command = [sys.executable, "-m", "lerobot_excav.scripts.main", "report", f"--rows={rows}"]
+    done = subprocess.run(command, env=os.environ | ascii_only, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr.decode()
+    assert b"# 5 ? 7 ? ?" in done.stdout
 
 
 def test_a_defect_of_the_program_keeps_its_traceback(monkeypatch):

@@ -23,9 +23,10 @@ from pydantic_core import to_json
 
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS
 from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.whole_file import write_whole
 from validation.soil import catalogue
 from validation.soil.experiment import Conditions
-from validation.soil.report import Outcome, summary_text, write_report
+from validation.soil.report import IMAGE_FOLDER, Outcome, is_report, summary_text, write_report
 
 REPORT = Path("docs", "explanation", "soil_validation.md")
 
@@ -66,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.json is not None:
         values = {name: getattr(given, name) for name in ("soil", "fidelity", "seeds", "quick")}
         values["experiments"] = {experiment.code: result.as_dict() for experiment, result in outcomes}
-        given.json.write_bytes(to_json(values, indent=1, inf_nan_mode="null") + b"\n")
+        write_whole(given.json, to_json(values, indent=1, inf_nan_mode="null") + b"\n")
     if given.report is not None:
         write_report(outcomes, conditions, given.report)
         print(f"written: {given.report}")
@@ -83,7 +84,17 @@ def _check_files(given: argparse.Namespace) -> None:
     for path in (given.json, given.report):
         if path is not None:
             require(not path.is_dir(), f"{path} is a folder; name a file in it")
+            require(
+                not path.exists() or (path == given.report and is_report(path)),
+                f"{path} exists, and is not a report of this command; choose another file, or remove it first",
+            )
             path.parent.mkdir(parents=True, exist_ok=True)
+    if given.report is not None and not given.report.exists():
+        images = given.report.parent / IMAGE_FOLDER
+        require(
+            not images.exists() or not any(images.iterdir()),
+            f"{images} holds pictures, and {given.report} would replace them; choose another folder",
+        )
 
 
 def _seeds(text: str) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ from jinja2 import FileSystemLoader
 
 from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.evaluation.markdown import templates
+from lerobot_excav.whole_file import write_whole
 from validation.soil.experiment import Conditions, SoilExperiment
 from validation.soil.plots import draw
 from validation.soil.results import Result, number_text
@@ -26,7 +27,13 @@ def write_report(outcomes: list[Outcome], conditions: Conditions, path: Path) ->
     for _, result in outcomes:
         for plot in result.plots:
             draw(plot, images / f"{plot.name}.png")
-    path.write_text(report_text(outcomes, conditions), encoding="utf-8")
+    write_whole(path, report_text(outcomes, conditions))
+
+
+def is_report(path: Path) -> bool:
+    """Return whether a file is a report of an earlier run, by the line that says so."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return "Written by `python -m validation.soil" in file.read(500)
 
 
 def report_text(outcomes: list[Outcome], conditions: Conditions) -> str:

@@ -6,21 +6,21 @@ the same state, so states cannot tell them apart: the target is known by its mas
 """
 
 import shutil
-import uuid
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
 
+from lerobot_excav.datasets.complete.exchange import copy_foreign_files, exchange, require_free, workspace
 from lerobot_excav.datasets.complete.recording_check import (
     require_completable,
     require_recorded_targets,
     whole_episodes,
 )
 from lerobot_excav.datasets.complete.session import SessionEpisode, read_session
+from lerobot_excav.datasets.complete.statistics import write_statistics
 from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
 from lerobot_excav.datasets.pairs.paired_index import write_index
@@ -50,39 +50,40 @@ def complete_recording(
     Raises:
         DatasetError: Columns exist already, the session does not fit, or the re-simulation deviates from the recording.
     """
-    if out is not None and out.exists():
-        raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+    # A link to a dataset stays a link, and the data is completed where it lies.
+    root, out = root.resolve(), out and out.absolute()
+    require_free(out)
     session = read_session(session_path)
     require_completable(root, session)
     whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
-    # Beside the destination, so that the last step is a rename.
-    temporary = (out or root).with_name(f".{root.name}.{uuid.uuid4().hex[:8]}")
-    try:
-        with _reduced(root, whole, temporary.with_name(f"{temporary.name}.whole")) as reduced:
-            # Leaving episodes out renumbers the others.
-            renumbered = {number: session[index] for number, index in enumerate(whole)}
-            require_recorded_targets(reduced, renumbered)
-            episodes = _resimulate_all(reduced, renumbered)
-            _write_completed(reduced, episodes, renumbered, temporary)
-        write_index(temporary)
-        return _put_in_place(temporary, root, out)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    with workspace(beside=out or root) as folder:
+        completed = folder / "completed"
+        reduced = _reduced(root, whole, folder / "whole")
+        # Leaving episodes out renumbers the others.
+        renumbered = {number: session[index] for number, index in enumerate(whole)}
+        require_recorded_targets(reduced, renumbered)
+        episodes = _resimulate_all(reduced, renumbered)
+        _write_completed(reduced, episodes, renumbered, completed)
+        write_statistics(completed, schema.excav_features(read_info(completed).spec))
+        write_index(completed)
+        if out is not None:
+            return completed.rename(out)
+        copy_foreign_files(root, completed)
+        # Not within the folder that is removed whatever happens.
+        original = folder.with_name(f"{folder.name}.original")
+        exchange(completed, root, original)
+        shutil.rmtree(original)
+        return root
 
 
-@contextmanager
-def _reduced(root: Path, episodes: list[int], copy: Path) -> Iterator[Path]:
-    """Provide a dataset with these episodes only, by LeRobot's own tool: `root` if it has no others, else a copy."""
+def _reduced(root: Path, episodes: list[int], copy: Path) -> Path:
+    """Return a dataset with these episodes only, by LeRobot's own tool: `root` if it has no others, else a copy."""
     others = sorted(set(range(read_info(root).total_episodes)) - set(episodes))
     if not others:
-        yield root
-        return
-    try:
-        dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
-        delete_episodes(dataset, others, output_dir=copy, repo_id=dataset.repo_id)
-        yield copy
-    finally:
-        shutil.rmtree(copy, ignore_errors=True)
+        return root
+    dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
+    delete_episodes(dataset, others, output_dir=copy, repo_id=dataset.repo_id)
+    return copy
 
 
 def _resimulate_all(root: Path, session: dict[int, SessionEpisode]) -> dict[int, Episode]:
@@ -128,18 +129,3 @@ def _write_completed(root: Path, episodes: dict[int, Episode], session: dict[int
     features = {key: (value(key), feature) for key, feature in columns.items()}
     dataset = LeRobotDataset(repo_id=f"local/{root.name}", root=root, video_backend="pyav")
     add_features(dataset, features, output_dir=out, repo_id=dataset.repo_id)
-
-
-def _put_in_place(temporary: Path, root: Path, out: Path | None) -> Path:
-    if out is not None:
-        temporary.rename(out)
-        return out
-    original = temporary.with_name(f"{temporary.name}.original")
-    root.rename(original)
-    try:
-        temporary.rename(root)
-    except OSError:
-        original.rename(root)
-        raise
-    shutil.rmtree(original)
-    return root

@@ -1,108 +1,203 @@
-"""What the simulated robot noted while `lerobot-record` recorded: which scene and targets each episode shows.
+"""What the simulated robot noted while `lerobot-record` recorded: how each episode began, and what was done in it."""
 
-The file is JSON Lines, one object per episode; `robots.session_log` writes it.
-"""
-
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
-
+from lerobot_excav.datasets.complete.session_events import (
+    ActionEvent,
+    CommandEvent,
+    EndEvent,
+    EpisodeEvent,
+    Event,
+    HeldEvent,
+    RestartEvent,
+    SessionEvent,
+    read_events,
+)
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
 from lerobot_excav.envs.tasks.selection import Schedule, checked_schedule
-from lerobot_excav.envs.tasks.settings import LAST_SCENE, TaskSettings
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import ConfigurationError, DatasetError, require, require_choice, require_integer
 
 
-class SessionEpisode(BaseModel):
-    """One recorded episode, a line of the file.
+@dataclass(kw_only=True)
+class Run:
+    """What was done from a start of a scene on.
+
+    Attributes:
+        scene_id: Scene.
+        target_id: Target that is commanded first.
+        frames: What LeRobot recorded, in order; only the last may be a restart, whose action was not carried out.
+        changes: Changes of the command, as pairs of the number of actions before and the target.
+    """
+
+    scene_id: int
+    target_id: int
+    frames: list[ActionEvent | RestartEvent] = field(default_factory=list)
+    changes: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def actions(self) -> int:
+        """How many actions were carried out."""
+        return sum(isinstance(frame, ActionEvent) for frame in self.frames)
+
+    @property
+    def schedule(self) -> Schedule:
+        """Changes of the command; what was commanded after the last action was never obeyed, nor shown in a frame."""
+        return tuple((frame, target_id) for frame, target_id in self.changes if frame < self.actions)
+
+
+@dataclass(kw_only=True)
+class SessionEpisode:
+    """One recorded episode.
 
     Attributes:
         episode_index: Its number when it was recorded.
-        simulation_version: Version of the simulation.
-        env: Name of the environment.
-        settings: What the simulation was set to, by name.
-        scene_id: Scene.
-        commands: After how many actions which target was commanded; the first at the start.
-        frames: How many actions were carried out.
-        restarts: Actions after which the scene was restarted within the episode.
+        place: File and line where it begins, for messages.
+        session: What the simulation was set to.
+        runs: What was done; a restart begins another run.
+        restarts: Numbers of actions after which the scene was restarted, or the machine held until its mask was found.
+        end: How it ended: `ended`, `stopped`, or None where the log breaks off.
     """
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
-
-    episode_index: NonNegativeInt
-    simulation_version: int
-    env: str
-    settings: dict[str, Any]
-    scene_id: int = Field(ge=0, le=LAST_SCENE)
-    commands: list[list[int]] = Field(min_length=1)
-    frames: NonNegativeInt
-    restarts: list[NonNegativeInt]
+    episode_index: int
+    place: str
+    session: SessionEvent
+    runs: list[Run]
+    restarts: list[int] = field(default_factory=list)
+    end: str | None = None
 
     @property
+    def simulation_version(self) -> int:
+        """Version of the simulation."""
+        return self.session.simulation_version
+
+    @property
+    def env(self) -> str:
+        """Name of the environment."""
+        return self.session.env
+
+    @cached_property
+    def spec(self) -> TaskSpec:
+        """The task."""
+        return task_of_settings(self.task_settings)
+
+    @cached_property
     def task_settings(self) -> TaskSettings:
         """Settings of an environment that behaves as the robot did."""
-        return env_types()[self.env].settings.of(self.settings)
+        return env_types()[self.env].settings.of(self.session.settings)
 
     @property
     def pair(self) -> Pair:
         """Scene and first target."""
-        return Pair(self.env, self.task_settings.scene_set, self.scene_id, self.commands[0][1])
+        return Pair(self.env, self.task_settings.scene_set, self.runs[0].scene_id, self.runs[0].target_id)
 
     @property
     def schedule(self) -> Schedule:
-        """Changes of the command."""
-        return tuple((frame, target_id) for frame, target_id in self.commands[1:])
+        """Changes of the command in an episode that was not restarted."""
+        return self.runs[0].schedule
+
+    @property
+    def frames(self) -> int:
+        """How many actions were carried out."""
+        return sum(run.actions for run in self.runs)
 
 
 def read_session(path: Path) -> dict[int, SessionEpisode]:
-    """Read the episodes of a session, by index; blank lines are left out.
+    """Read the episodes of a session that were not discarded, by index.
 
-    Of two lines with one index the later counts: the robot repeats a number when an episode was recorded again.
+    An episode takes the place of all earlier ones with its index or a higher one: LeRobot counts on from what it has,
+    so those were discarded, or not kept when the recording was interrupted.
 
     Raises:
-        DatasetError: The file is missing, or a line is not what it should be: it is no JSON object, lacks a field, or
-            has an environment, a setting, a scene or a target that is not possible. The message names line and field.
+        DatasetError: The file is missing, a line is not an event or comes out of turn, or has an environment, a
+            setting, a scene, a target or a number of values that is not possible. The message names line and field.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
-        raise DatasetError(f"{path} does not exist; the robot wrote its session to --robot.session_log") from None
-    episodes = [_episode(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
-    return {episode.episode_index: episode for episode in episodes}
+    reader = _Reader()
+    for place, event in read_events(path):
+        try:
+            reader.take(event, place)
+        except ConfigurationError as error:
+            raise DatasetError(f"{place}: {error}") from None
+    return reader.episodes
 
 
-def _episode(line: str, place: str) -> SessionEpisode:
-    try:
-        episode = SessionEpisode.model_validate_json(line)
-        _require_playable(episode)
-    except ValidationError as error:
-        problems = "; ".join(map(_in_words, error.errors()))
-        raise DatasetError(f"{place}: {problems}; is it a session log of a simulated robot?") from None
-    except ConfigurationError as error:
-        raise DatasetError(f"{place}: {error}") from None
-    return episode
+class _Reader:
+    """Puts events together."""
 
+    def __init__(self) -> None:
+        self.episodes: dict[int, SessionEpisode] = {}
+        self._session: SessionEvent | None = None
+        self._last: SessionEpisode | None = None  # the one to which events belong
 
-def _in_words(problem: Any) -> str:
-    name = ".".join(map(str, problem["loc"]))
-    words = {
-        "missing": f"lacks {name}",
-        "extra_forbidden": f"{name} is not known",
-        "json_invalid": f"not JSON ({problem['msg']}); was its writer interrupted? Remove the line if it is the last",
-        "model_type": "a JSON object is expected",
-    }
-    return words.get(problem["type"], f"{name}={problem['input']!r}: {problem['msg']}")
+    def take(self, event: Event, place: str) -> None:
+        """Take the next event; raise ConfigurationError if it is not possible."""
+        match event:
+            case SessionEvent():
+                require_choice("env", event.env, tuple(env_types()))
+                task_of_settings(env_types()[event.env].settings.of(event.settings))
+                self._session, self._last = event, None
+            case EpisodeEvent():
+                self._begin(event, place)
+            case EndEvent(event="discarded"):
+                self.episodes.pop(self._episode(event).episode_index, None)
+                self._last = None
+            case EndEvent():
+                self._running(event).end = event.event
+            case _:
+                self._note(event, self._running(event))
 
+    def _begin(self, event: EpisodeEvent, place: str) -> None:
+        require(self._session is not None, "an episode begins before the line of its session")
+        assert self._session is not None
+        start = Run(scene_id=event.scene_id, target_id=event.target_id)
+        index = event.episode_index
+        self._last = SessionEpisode(episode_index=index, place=place, session=self._session, runs=[start])
+        self._require_target(event.target_id, self._last)
+        self.episodes = {i: episode for i, episode in self.episodes.items() if i < index} | {index: self._last}
 
-def _require_playable(episode: SessionEpisode) -> None:
-    require_choice("env", episode.env, tuple(env_types()))
-    targets = task_of_settings(episode.task_settings).target_count
-    first, *changes = episode.commands
-    require(
-        len(first) == 2 and first[0] == 0,
-        f"commands={episode.commands!r} is not possible; it begins with [0, first target]",
-    )
-    require_integer("commands: target_id", first[1], 0, targets - 1)
-    checked_schedule(changes, targets, episode.frames)
+    def _note(self, event: Event, episode: SessionEpisode) -> None:
+        run = episode.runs[-1]
+        match event:
+            case ActionEvent():
+                self._require_values(event, episode)
+                run.frames.append(event)
+            case HeldEvent():
+                episode.restarts.append(episode.frames)
+            case CommandEvent():
+                run.changes.append((run.actions, event.target_id))
+                checked_schedule(run.changes, episode.spec.target_count, run.actions + 1)
+            case RestartEvent():
+                episode.restarts.append(episode.frames)
+                self._require_target(event.target_id, episode)
+                if event.state is not None and event.action is not None:
+                    self._require_values(event, episode)
+                    run.frames.append(event)
+                episode.runs.append(Run(scene_id=event.scene_id, target_id=event.target_id))
+
+    def _episode(self, event: Event) -> SessionEpisode:
+        require(self._last is not None, f"event={event.event!r} comes before the line of its episode")
+        assert self._last is not None
+        return self._last
+
+    def _running(self, event: Event) -> SessionEpisode:
+        episode = self._episode(event)
+        require(episode.end is None, f"event={event.event!r} comes after its episode has {episode.end}")
+        return episode
+
+    @staticmethod
+    def _require_target(target_id: int, episode: SessionEpisode) -> None:
+        require_integer("target_id", target_id, 0, episode.spec.target_count - 1)
+
+    @staticmethod
+    def _require_values(event: ActionEvent | RestartEvent, episode: SessionEpisode) -> None:
+        names = {"state": episode.spec.state_names, "action": episode.spec.action_names}
+        for name, expected in names.items():
+            found = getattr(event, name)
+            require(
+                len(found) == len(expected),
+                f"{name}={found} has {len(found)} values; {episode.env} has {len(expected)}: {', '.join(expected)}",
+            )

@@ -91,12 +91,12 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
         }
         images = {schema.camera_key(camera): frames[frame] for camera, frames in episode.images.items()}
         dataset.add_frame({"task": episode.task, **constant, **varying, **images})
-    with _without_progress_bars():
+    with without_progress_bars():
         dataset.save_episode()
 
 
 @contextmanager
-def _without_progress_bars() -> Iterator[None]:
+def without_progress_bars() -> Iterator[None]:
     """Keep the library's bar per episode out of the bar that counts the episodes."""
     enabled = not hf_datasets.are_progress_bars_disabled()
     hf_datasets.disable_progress_bars()

@@ -5,12 +5,17 @@ LeRobot dataset that grows from them. The finished dataset is renamed to `OUT`, 
 are assembled in the order of the settings, so neither the number of workers nor an interruption leaves a trace.
 """
 
+import errno
 import shutil
 import time
+from collections.abc import Iterator
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from PIL import UnidentifiedImageError
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.pairs.paired_index import write_index
@@ -22,6 +27,7 @@ from lerobot_excav.datasets.record.provenance import read_provenance, write_prov
 from lerobot_excav.datasets.record.simulation import simulate_episode
 from lerobot_excav.datasets.record.workers import episode_result, require_workers, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
+from lerobot_excav.whole_file import named
 
 Outcome = dict[str, Any]
 
@@ -107,14 +113,30 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
         for pair, future in futures.items():
             outcome = episode_result(pair, future)
             if outcome["kept"]:
-                append_episode(dataset, EpisodeStore(partial.episodes).read(pair), settings)
+                episode = EpisodeStore(partial.episodes).read(pair)
+                with _errors_name(partial.dataset):
+                    append_episode(dataset, episode, settings)
             outcomes.append(outcome)
     _require_any(outcomes, partial.folder)
-    dataset.finalize()
+    with _errors_name(partial.dataset):
+        dataset.finalize()
     shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
     write_provenance(partial.dataset, settings, outcomes)
     write_index(partial.dataset)
     return outcomes
+
+
+@contextmanager
+def _errors_name(dataset: Path) -> Iterator[None]:
+    """Let errors of the library's files say where they are; it only logs that a picture could not be written."""
+    try:
+        yield
+    except UnidentifiedImageError as error:
+        raise OSError(errno.EIO, "a picture could not be written", str(dataset)) from error
+    except OSError as error:
+        if error.filename:
+            raise
+        raise named(error, dataset) from error
 
 
 def _require_any(outcomes: list[Outcome], folder: Path) -> None:

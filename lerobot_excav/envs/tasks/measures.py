@@ -1,11 +1,14 @@
 """What is measured of a task: the record of an episode, and the columns that sum records up."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt, model_validator
+
+from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
+from lerobot_excav.envs.tasks.settings import FRAME_RATES, LAST_SCENE, SCENE_SETS, TARGETS_PER_SCENE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,11 +34,26 @@ class EpisodeKey(NamedTuple):
         return f"{self.scene_set}/{self.scene_id}/{self.target_id}"
 
 
+def one_of(allowed: Collection[Any]) -> AfterValidator:
+    """Return a check that a value is one of those that are allowed."""
+
+    def check(value: Any) -> Any:
+        if value not in allowed:
+            raise ValueError(f"{value!r} is not known; allowed: {', '.join(map(str, allowed))}")
+        return value
+
+    return AfterValidator(check)
+
+
+TargetId = Annotated[int, Field(ge=0, lt=TARGETS_PER_SCENE)]
+"""Number of a target of a scene."""
+
+
 class CommandedTarget(NamedTuple):
     """A target, and the first frame in which it was commanded."""
 
-    frame: int
-    target_id: int
+    frame: NonNegativeInt
+    target_id: TargetId
 
 
 class EpisodeRecord(BaseModel):
@@ -46,23 +64,23 @@ class EpisodeRecord(BaseModel):
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
-    simulation_version: int
+    simulation_version: PositiveInt
     task: str
-    fps: int
-    episode_length: int
-    scene_set: str
-    scene_id: int
-    target_id: int  # commanded first
+    fps: Annotated[int, one_of(FRAME_RATES)]
+    episode_length: PositiveInt
+    scene_set: Annotated[str, one_of(SCENE_SETS)]
+    scene_id: int = Field(ge=0, le=LAST_SCENE)
+    target_id: TargetId  # commanded first
     mask_source: str
-    mask_condition: str
-    mask_noise: str
-    mask_noise_px: int
+    mask_condition: Annotated[str, one_of(MASK_CONDITIONS)]
+    mask_noise: Annotated[str, one_of(MASK_NOISES)]
+    mask_noise_px: NonNegativeInt
     target_overlay: bool
-    shown_target_id: int  # of the last mask, noise aside; -1 if it showed none
+    shown_target_id: int = Field(ge=-1, lt=TARGETS_PER_SCENE)  # of the last mask, noise aside; -1 if it showed none
     is_success: bool  # every part of the task succeeded
-    frames: int
+    frames: NonNegativeInt
     mask_missing: bool  # the episode was given up because the source found nothing
-    mask_missing_frames: int  # in which the machine was held still, because the source had found nothing yet
+    mask_missing_frames: NonNegativeInt  # in which the machine was held still, because the source had found nothing yet
     commands: tuple[CommandedTarget, ...]  # all, in their order; the first begins at frame 0
 
     @model_validator(mode="after")

@@ -68,6 +68,19 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         "can tell where it lies",
         default=False,
     )
+    augment_shift_px: int = setting(
+        "In training, move the main picture and its mask together by up to this much along each axis, drawn for each "
+        "sample; other views stay [px]",
+        default=0,
+        low=0,
+        high=1024,
+        hint="0 leaves pictures where they are.",
+    )
+    compare_masks: bool = setting(
+        "In training, compare masks with the stored frames; turn it off only if a processor of your own moves pictures "
+        "and masks together",
+        default=True,
+    )
 
     chunk_size: int = setting("Actions of a plan [frames]", default=100, low=1, high=10_000)
     n_action_steps: int | None = setting(
@@ -295,9 +308,14 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 f"{key} has {shape[0]} channel(s), shape {shape}; mask_act reads RGB cameras. Leave it out of "
                 "--policy.input_features.",
             )
+        main_shape = tuple(self.image_features[self.main_camera_key].shape)
+        require(
+            self.augment_shift_px < min(main_shape[1:]),
+            f"policy.augment_shift_px={self.augment_shift_px} would move {self.main_camera_key} of shape {main_shape} "
+            f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
+        )
         mask = self.image_features.get(self.mask_key)
         if mask is not None:
-            main_shape = tuple(self.image_features[self.main_camera_key].shape)
             require_mask_shape(self.mask_key, tuple(mask.shape), self.main_camera_key, main_shape)
 
     def set_dataset_feature_metadata(self, features: dict[str, Any]) -> None:

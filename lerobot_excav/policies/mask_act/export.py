@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 from draccus.utils import DraccusException
 from lerobot.configs import PreTrainedConfig
+from safetensors import SafetensorError
 from safetensors.torch import save_file
 from torch import Tensor
 
@@ -54,7 +55,12 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
     with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as temporary:
         folder = Path(temporary) / place.name
         folder.mkdir()
-        save_file(weights, folder / WEIGHTS, metadata={"format": "pt"})
+        try:
+            save_file(weights, folder / WEIGHTS, metadata={"format": "pt"})
+        except SafetensorError as error:
+            raise ConfigurationError(
+                f"out={out} cannot be written: {error}; free some space, or write elsewhere."
+            ) from error
         config.save_pretrained(folder)
         for name in PROCESSORS:
             for file in sorted(checkpoint.glob(f"{Path(name).stem}*")):

@@ -16,6 +16,8 @@ from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights,
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
+from lerobot_excav.policies.mask_act.picture_shift import shift_together
+from lerobot_excav.policies.mask_act.training_masks import TrainingMasks
 from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
 
 
@@ -31,10 +33,17 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     | `observation.state` | normalised robot state, (B, S), if the policy has one |
     | `observation.environment_state` | normalised environment state, (B, E), if the policy has one |
     | `action`, `action_is_pad` | training only: (B, chunk_size, A), (B, chunk_size) |
+    | `index`, `episode_index` | training only: (B,), the frames that the masks are compared with |
+
+    Actions are float32, also where `use_amp` computes them in fewer bits.
 
     Args:
         config: Settings, with the features of dataset or environment.
-        **kwargs: Statistics and metadata that LeRobot passes to every policy; not needed here.
+        **kwargs: What LeRobot passes to every policy. `dataset_meta`, if a policy is built for training, is the
+            dataset whose masks `TrainingMasks` checks.
+
+    Raises:
+        ConfigurationError: The features do not fit, or the dataset's masks cannot be used.
     """
 
     config_class = MaskACTConfig
@@ -45,13 +54,14 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         super(ACTPolicy, self).__init__(config)
         config.validate_features()
         self.config = config
+        self._training_masks = TrainingMasks(config, kwargs.get("dataset_meta"))
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
-        self._queue = ActionQueue(resolved(config.n_action_steps))
-        self._ensemble = (
-            TemporalEnsembles(config.temporal_ensemble_coeff, config.chunk_size)
-            if config.temporal_ensemble_coeff is not None
-            else None
+        # LeRobot's `drop_queued_actions` clears what has this name.
+        self._action_queue = (
+            ActionQueue(resolved(config.n_action_steps))
+            if config.temporal_ensemble_coeff is None
+            else TemporalEnsembles(config.temporal_ensemble_coeff, config.chunk_size)
         )
 
     @classmethod
@@ -87,9 +97,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     def reset(self) -> None:
         """Forget plans and targets; call it whenever the environments are reset."""
         self._watch.reset()
-        self._queue.reset()
-        if self._ensemble is not None:
-            self._ensemble.reset()
+        self._action_queue.clear()
 
     def forward(self, batch: Batch, reduction: str = "mean") -> tuple[Tensor, dict[str, float]]:
         """Return the training loss: mean absolute error, plus `kl_weight` times the latent's divergence.
@@ -103,11 +111,15 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
             Loss, a scalar or shape (B,), and its parts for the log.
 
         Raises:
-            ConfigurationError: Unknown reduction, or observations that do not fit the policy.
+            ConfigurationError: Unknown reduction, observations that do not fit the policy, or a mask that is not the
+                one that the dataset holds.
         """
         require_choice("reduction", reduction, ("mean", "none"))
         demonstration = Demonstration(batch[ACTION], batch["action_is_pad"])
         mask = target_mask(self.config, batch, is_training=True)
+        if self.training:
+            self._training_masks.check(batch, mask)
+            batch, mask = self._augmented(batch, mask)
         actions, latent = self._run(batch, mask, demonstration if self.training else None)
         error = F.l1_loss(actions, demonstration.actions, reduction="none").mean(dim=-1)  # (B, chunk_size)
         valid = ~demonstration.is_pad
@@ -122,17 +134,17 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
     @torch.no_grad()
     def predict_action_chunk(self, batch: Batch, **kwargs: Any) -> Tensor:
-        """Return a plan for each environment: normalised actions, shape (B, chunk_size, A).
+        """Return a plan for each environment: normalised actions, float32, shape (B, chunk_size, A).
 
         Raises:
             ConfigurationError: The observations do not fit the policy, or the mask is not binary.
         """
         self.eval()
-        return self._run(batch, target_mask(self.config, batch), None)[0]
+        return self._run(batch, target_mask(self.config, batch), None)[0].float()
 
     @torch.no_grad()
     def select_action(self, batch: Batch, **kwargs: Any) -> Tensor:
-        """Return the next action of each environment, shape (B, A), normalised.
+        """Return the next action of each environment, float32, shape (B, A), normalised.
 
         An environment gets a new plan when its plan has run out or its mask has changed. The other environments keep
         their plans.
@@ -147,12 +159,20 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         """
         self.eval()
         changed = self._watch.changed(target_mask(self.config, batch))
-        if self._ensemble is not None:
-            return self._ensemble.update(self.predict_action_chunk(batch), changed)
-        stale = self._queue.stale(changed)
+        if isinstance(self._action_queue, TemporalEnsembles):
+            return self._action_queue.update(self.predict_action_chunk(batch), changed)
+        stale = self._action_queue.stale(changed)
         if stale.any():
-            self._queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
-        return self._queue.pop()
+            self._action_queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
+        return self._action_queue.pop()
+
+    def _augmented(self, batch: Batch, mask: Tensor) -> tuple[Batch, Tensor]:
+        """Return batch and mask for one training step, by the `augment_...` settings."""
+        if not self.config.augment_shift_px:
+            return batch, mask
+        main = self.config.main_camera_key
+        picture, mask = shift_together(batch[main], mask, self.config.augment_shift_px)
+        return {**batch, main: picture}, mask
 
     def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
         plan: tuple[Tensor, Latent | None] = self.model(

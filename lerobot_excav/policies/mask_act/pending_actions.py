@@ -42,11 +42,15 @@ class ActionQueue:
 
     def __init__(self, n_action_steps: int) -> None:
         self._n_action_steps = n_action_steps
-        self.reset()
+        self.clear()
 
-    def reset(self) -> None:
+    def clear(self) -> None:
         """Drop every plan."""
         self._plans: list[deque[Tensor]] = []
+
+    def __len__(self) -> int:
+        """Return the number of actions that every environment has left."""
+        return min(map(len, self._plans), default=0)
 
     def stale(self, changed: Tensor) -> Tensor:
         """Return which environments need a new plan, bool (B,): their target has `changed`, or nothing is left."""
@@ -75,11 +79,15 @@ class TemporalEnsembles:
 
     def __init__(self, coefficient: float, chunk_size: int) -> None:
         self._new_one = partial(ACTTemporalEnsembler, coefficient, chunk_size)
-        self.reset()
+        self.clear()
 
-    def reset(self) -> None:
+    def clear(self) -> None:
         """Drop every average."""
         self._averages: list[ACTTemporalEnsembler] = []
+
+    def __len__(self) -> int:
+        """Return the number of actions that need no new plan: none."""
+        return 0
 
     def update(self, chunk: Tensor, changed: Tensor) -> Tensor:
         """Add a plan per environment, (B, chunk_size, A), and return the averaged action of this step, (B, A).

@@ -1,8 +1,10 @@
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 import toy_reach.table
 from lerobot.datasets import delete_episodes, merge_datasets, remove_feature
@@ -10,15 +12,13 @@ from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.complete import resimulation
 from lerobot_excav.datasets.complete.resimulation import complete_recording
-from lerobot_excav.datasets.complete.session import read_session
-from lerobot_excav.datasets.format.episode_table import iterate_episodes
-from lerobot_excav.datasets.format.schema import PAIR_KEY, SCENE_KEY, TARGET_KEY, excav_features
+from lerobot_excav.datasets.format.schema import PAIR_KEY, excav_features
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index, write_index
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.robots.session_log import SessionLog
+from lerobot_excav.scripts.main import main
 
-from ..toy import load, record_toy, toy_settings
+from ..toy import load, record_toy, write_session
 
 
 def make_recording(dataset, folder, env=None):
@@ -26,12 +26,10 @@ def make_recording(dataset, folder, env=None):
     remove_feature(
         load(dataset), list(excav_features(REACH)), output_dir=folder / "recording", repo_id="local/recording"
     )
-    log = SessionLog(folder / "session.jsonl", REACH, toy_settings(env=env).env)
-    for episode in iterate_episodes(dataset, (PAIR_KEY, SCENE_KEY, TARGET_KEY)):
-        log.begin(episode.index, scene_id=episode.pair.scene_id, target_id=episode.pair.target_id)
-        for target_id in [*episode.target_id[1:], episode.target_id[-1]]:
-            log.count_frame(int(target_id))
-    log.write()
+    for path in folder.glob("recording/meta/episodes/*/*.parquet"):
+        table = pq.read_table(path)  # the statistics of the columns are still there
+        pq.write_table(table.select([name for name in table.column_names if "/excav." not in name]), path)
+    write_session(dataset, folder / "session.jsonl", env)
     return folder / "recording", folder / "session.jsonl"
 
 
@@ -48,20 +46,38 @@ def recording(recorded):
 
 @pytest.fixture
 def session(recorded, tmp_path):
-    """Write the session with some lines changed: `{episode_index: changes}`; settings are changed one by one."""
+    """Write the session with some episodes changed: `{episode_index: changes}`.
+
+    A change is a field of the lines `session` and `episode`, a setting (`settings`, one by one), or how many `frames`
+    are left, after which of them the machine was `held`, or events `more` after the episode.
+    """
     lines = [json.loads(line) for line in recorded[1].read_text().splitlines()]
+    begins = [number for number, line in enumerate(lines) if line["event"] == "episode"]
+    chunks = [lines[begin:end] for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True)]
+
+    def changed(chunk, frames=None, held=None, more=(), **fields):
+        head = lines[0] | {name: fields.pop(name) for name in ("env", "simulation_version") if name in fields}
+        settings = fields.pop("settings", {})
+        head["settings"] = (lines[0]["settings"] if head["env"] == "toy_reach" else {}) | settings
+        begin, *events = chunk
+        events = events[:frames]
+        if held is not None:
+            events.insert(held, {"event": "held"})
+        return [head, begin | fields, *events, *more]
 
     def write(changes=None, *, first=None):
-        before = [] if first is None else [{**lines[0], **first}]
-        changed = [*before, *({**line, **(changes or {}).get(line["episode_index"], {})} for line in lines)]
-        for line in changed:
-            if line["env"] == "toy_reach":
-                line["settings"] = {**lines[0]["settings"], **line["settings"]}
+        before = [] if first is None else changed(chunks[0], **first)
+        events = [event for i, chunk in enumerate(chunks) for event in changed(chunk, **(changes or {}).get(i, {}))]
         path = tmp_path / "session.jsonl"
-        path.write_text("".join(json.dumps(line) + "\n" for line in changed))
+        path.write_text("".join(json.dumps(event) + "\n" for event in [*before, *events]))
         return path
 
     return write
+
+
+def episode_statistics(root):
+    table = pq.read_table(next(root.glob("meta/episodes/*/*.parquet")))
+    return table.select([name for name in table.column_names if name.startswith("stats/")]).to_pandas()
 
 
 def test_completing_a_recording_restores_what_the_simulation_knew(recording, session, paired_dataset, tmp_path):
@@ -71,6 +87,15 @@ def test_completing_a_recording_restores_what_the_simulation_knew(recording, ses
         assert completed.keys() == original.keys()
         for key, value in original.items():
             np.testing.assert_array_equal(np.asarray(completed[key]), np.asarray(value))
+    # Statistics as well, of the dataset and of every episode.
+    found, expected = load(out).meta.stats, load(paired_dataset).meta.stats
+    assert found.keys() == expected.keys()
+    for key, stats in expected.items():
+        for name, value in stats.items():
+            np.testing.assert_allclose(found[key][name], value, rtol=1e-6, atol=1e-9, err_msg=f"{key}/{name}")
+    found, expected = episode_statistics(out), episode_statistics(paired_dataset)
+    pd.testing.assert_frame_equal(found[expected.columns], expected)
+    assert set(found.columns) == set(expected.columns)
     # And it merges with scripted demonstrations.
     merge_datasets([load(out), load(paired_dataset)], "local/m", output_dir=tmp_path / "m")
     assert write_index(tmp_path / "m")["pair_uid"].value_counts().tolist() == [2] * 19
@@ -118,14 +143,17 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
     [
         ({"settings": {"fps": 5}}, "episode 1: the robot ran at 5 frames/s, the dataset has 10"),
         ({"frames": 5}, r"episode 1 has 8 frames, but the session noted 5 .* edited after recording"),
-        ({"commands": [[0, 2]]}, r"episode 1 does not show the target mask of toy_reach/train/0/2"),
+        ({"target_id": 2}, r"episode 1 does not show the target mask of toy_reach/train/0/2"),
         ({"scene_id": 4}, r"episode 1 does not show the target mask of toy_reach/train/4/1"),
         ({"settings": {"observation_height": 64}}, r"episode 1 does not show the target mask"),
         ({"settings": {"table": "ice"}}, r"episode 1: the re-simulation of .* at frame 1"),
         ({"simulation_version": 7}, r"episodes 1 of version 7 of the simulation cannot be replayed"),
-        ({"restarts": [3]}, r"restarted, .* within episode 1 at frame \[3\], .* --skip_restarted"),
+        ({"held": 3}, r"restarted, .* within episode 1 at frame \[3\], .* --skip_restarted"),
         ({"episode_index": 99}, r"no line for episodes \[1\]"),
-        ({"env": "fr5_grasp", "settings": {}}, "episode 1: the session is of fr5_grasp, the recording of toy_reach"),
+        (
+            {"env": "fr5_grasp", "settings": {}, "frames": 0},
+            "episode 1: the session is of fr5_grasp, the recording of toy_reach",
+        ),
     ],
 )
 def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, changes, message):
@@ -133,55 +161,14 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
         complete_recording(recording, session({1: changes}), out=tmp_path / "c")
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"restarts": None}, "restarts=None: Input should be a valid array"),
-        ({"restarts": [-1]}, r"restarts\.0=-1: .*greater than or equal to 0"),
-        ({"commands": [[0, 9]]}, "commands: target_id=9 .*from 0 to 3"),
-        ({"commands": [[1, 2]]}, r"commands=\[\[1, 2\]\] .*it begins with \[0, first target\]"),
-        ({"commands": [[0, 1], [3, 7]]}, "commands: target_id=7 .*from 0 to 3"),
-        ({"commands": [[0, 1], [3, 2], [3, 0]]}, "commands: frame=3 .*from 4 to 7"),
-        ({"commands": [[0, 1], [2]]}, r"commands=.*: \[2\] is not a pair of frame and target"),
-        ({"commands": []}, "commands=.* at least 1 item"),
-        ({"simulation_version": "1"}, "simulation_version='1': .*valid integer"),
-        ({"scene_id": -3}, "scene_id=-3: .*greater than or equal to 0"),
-        ({"colour": 1}, "colour is not known"),
-        ({"env": "lathe"}, "env='lathe' .*'toy_reach'"),
-        ({"settings": {"fps": "10"}}, "fps='10' .*give one of"),
-        ({"settings": {"task": "Dance-v0"}}, "task='Dance-v0' .*'Reach-v0'"),
-        ({"settings": {"colour": 1}}, "colour is not a setting of toy_reach; allowed: task"),
-    ],
-)
-def test_a_session_with_an_impossible_value_names_line_field_and_what_is_allowed(session, changes, message):
-    with pytest.raises(DatasetError, match=rf"session\.jsonl:2: {message}"):
-        read_session(session({1: changes}))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{", "not JSON .* Remove the line if it is the last"),
-        ("[3]", "a JSON object is expected"),
-        ('{"episode_index": 0}', "lacks simulation_version; lacks env;"),
-    ],
-)
-def test_a_damaged_or_missing_session_is_named(tmp_path, text, message):
-    (tmp_path / "s.jsonl").write_text(f"\n{text}")
-    with pytest.raises(DatasetError, match=rf"s\.jsonl:2: {message}"):
-        read_session(tmp_path / "s.jsonl")
-    with pytest.raises(DatasetError, match=r"none does not exist; .* --robot\.session_log"):
-        read_session(tmp_path / "none")
-
-
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):
-    path = session({1: {"restarts": [3], "frames": 2}, 6: {"restarts": [0]}})
+    path = session({1: {"held": 3, "frames": 4}, 6: {"held": 0}})
     out = complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True)
     expected = build_index(paired_dataset).drop(index=[1, 6]).reset_index(drop=True)
     expected["episode_index"] = range(17)
     pd.testing.assert_frame_equal(build_index(out), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "session.jsonl"]
-    path = session({index: {"restarts": [1]} for index in range(19)})
+    path = session({index: {"held": 1} for index in range(19)})
     with pytest.raises(DatasetError, match="if others remain"):
         complete_recording(recording, path, out=tmp_path / "d", skip_restarted=True)
 
@@ -208,8 +195,19 @@ def test_a_failure_while_writing_leaves_the_recording_alone(recording, recorded,
     assert [path.name for path in tmp_path.iterdir()] == ["recording"]
 
 
-def test_a_failed_exchange_puts_the_recording_back(tmp_path):
-    (tmp_path / "recording").mkdir()
-    with pytest.raises(FileNotFoundError):
-        resimulation._put_in_place(tmp_path / "absent", tmp_path / "recording", None)
-    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+def test_a_link_to_a_recording_stays_a_link_and_the_recording_may_be_the_working_directory(
+    recording, recorded, tmp_path, monkeypatch
+):
+    for name in ("linked", "here"):
+        shutil.copytree(recording, tmp_path / name)
+        (tmp_path / name / "README.md").write_text("mine")
+    (tmp_path / "link").symlink_to("linked")
+    assert main(["index", str(tmp_path / "link"), f"--session={recorded[1]}"]) == 0
+    monkeypatch.chdir(tmp_path / "here")
+    assert main(["index", ".", f"--session={recorded[1]}"]) == 0
+    assert sorted(path.name for path in Path().iterdir()) == ["README.md", "data", "meta"]
+    assert (tmp_path / "link").is_symlink()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["here", "link", "linked"]
+    for name in ("linked", "here"):
+        assert len(build_index(tmp_path / name)) == 19
+        assert (tmp_path / name / "README.md").read_text() == "mine"

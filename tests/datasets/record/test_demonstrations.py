@@ -1,12 +1,15 @@
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import toy_reach.env
 
 from lerobot_excav.datasets.pairs.paired_index import build_index
-from lerobot_excav.datasets.record import simulation
+from lerobot_excav.datasets.record import assembly, simulation
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.datasets.record.episode_store import EpisodeStore
 from lerobot_excav.datasets.record.partial_run import PartialRun
@@ -67,6 +70,40 @@ def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, monkeypatch, c
     assert len(played) == len(set(played)) == 12
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
     assert not (tmp_path / "broken.partial").exists()
+
+
+@pytest.mark.parametrize("stage", ["episode", "outcome", "assembly", "index"])
+def test_after_a_full_disk_a_run_continues_and_nothing_that_was_finished_is_played_again(tmp_path, monkeypatch, stage):
+    record_toy(tmp_path / "whole", scenes=1)
+    played, full = [], OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    play, write, written = simulation.play_demonstration, Path.write_bytes, []
+
+    def write_bytes(path, content):
+        written.append(path)
+        is_full = len(written) > 4 and {"episode": ".npz.", "outcome": ".json."}.get(stage, "/") in path.name
+        write(path, content[:10] if is_full else content)
+        if is_full:
+            raise full
+
+    def fail(*_, **__):
+        raise full
+
+    monkeypatch.setattr(simulation, "play_demonstration", lambda *a: (played.append(a[1]), play(*a))[1])
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", write_bytes)
+        if stage == "assembly":
+            patch.setattr(assembly.LeRobotDataset, "save_episode", fail)
+        if stage == "index":
+            patch.setattr(pd.DataFrame, "to_parquet", fail)
+        with pytest.raises(OSError, match=rf"No space left on device: '{tmp_path}/v\.partial/"):
+            record_toy(tmp_path / "v", scenes=1)
+    assert not (tmp_path / "v").exists()
+    finished = len(list((tmp_path / "v.partial" / "episodes").glob("[!.]*.json")))
+    record_toy(tmp_path / "v", scenes=1, resume=True)
+    assert contents(tmp_path / "v") == contents(tmp_path / "whole")
+    assert finished == (4 if stage in ("assembly", "index") else 2)
+    assert len(played) == 4 + 4 - finished
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["v", "whole"]
 
 
 @pytest.mark.parametrize("keep", [False, True])

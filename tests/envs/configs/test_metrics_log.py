@@ -1,6 +1,7 @@
 """The metrics file holds each counted episode once, in LeRobot's order."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -55,7 +56,9 @@ def test_an_interrupted_batch_is_dropped(log):
 def test_a_line_is_place_and_seed_and_what_the_environment_says_as_plain_values_and_null_for_missing_numbers(log):
     play(log, [None, None], mass=np.float32(0.5), contacts=np.int64(2), distance=float("nan"), phase="dump")
     expected = {"episode_ix": 0, "seed": None, "mass": 0.5, "contacts": 2, "distance": None, "phase": "dump"}
-    assert lines_of(log)[0] == expected
+    line = lines_of(log)[0]
+    assert line.pop("evaluation")
+    assert line == expected
 
 
 def test_an_episode_without_metrics_is_refused(log):
@@ -68,6 +71,25 @@ def test_an_existing_file_is_appended_to(log):
     log.path.write_text('{"earlier": 1}\n')
     play(log, [7, 8])
     assert [line.get("earlier") for line in lines_of(log)] == [1, None, None]
+
+
+@pytest.mark.parametrize("text", ["years of work", "\n", "[1]\n"])
+def test_a_file_that_holds_something_else_is_kept(tmp_path, text):
+    (tmp_path / "thesis.tex").write_text(text)
+    with pytest.raises(
+        ConfigurationError, match=r"env\.metrics_path=\S*thesis\.tex' holds something else than metrics"
+    ):
+        MetricsLog(tmp_path / "thesis.tex", n_envs=1)
+    assert (tmp_path / "thesis.tex").read_text() == text
+
+
+def test_a_disk_that_fills_within_a_line_leaves_no_part_of_it(log, monkeypatch):
+    play(log, [7, 8])
+    write = os.write
+    monkeypatch.setattr(os, "write", lambda descriptor, line: write(descriptor, line[:10]))
+    with pytest.raises(OSError, match=r"No space left on device: .*metrics\.jsonl"):
+        play(log, [9, 10])
+    assert len(lines_of(log)) == 2
 
 
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path):

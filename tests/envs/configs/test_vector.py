@@ -72,7 +72,9 @@ def evaluate(env, path, start_seed=100):
         counted = eval_policy(env, policy, *processors, n_episodes=EPISODES, start_seed=start_seed)["per_episode"]
     finally:
         env.close()
-    return counted, [json.loads(line) for line in path.read_text().splitlines()]
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert len({line.pop("evaluation") for line in lines}) == 1
+    return counted, lines
 
 
 @pytest.fixture

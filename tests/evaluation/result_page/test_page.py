@@ -108,6 +108,35 @@ def test_what_an_earlier_page_was_made_of_does_not_come_back(finished, out, agai
     assert by_hand.exists()
 
 
+@pytest.mark.parametrize(
+    "name", ["report.md", "rows.jsonl", "success.png", "metrics/paired.jsonl", "metrics/zero.json"]
+)
+def test_a_file_of_somebody_else_in_the_place_of_one_is_kept(finished, tmp_path, name):
+    mine = tmp_path / "results" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("years of work")
+    with pytest.raises(DatasetError, match=rf"{name} was not written by a report; move it elsewhere"):
+        write_page(make_page(finished), tmp_path / "results")
+    assert [path for path in (tmp_path / "results").rglob("*") if path.is_file()] == [mine]
+    assert mine.read_text() == "years of work"
+
+
+def test_metrics_of_somebody_else_in_the_folder_of_the_copies_are_kept(finished, tmp_path):
+    folder = tmp_path / "results" / "metrics"
+    (folder / "curves" / "other").mkdir(parents=True)
+    mine = [folder / name for name in ("mine.jsonl", "mine.json", "curves/other/1.jsonl", "curves/other/1.json")]
+    for path in mine:
+        path.write_text("{}")
+    write_page(make_page(finished), tmp_path / "results")
+    assert all(path.exists() for path in mine)
+
+
+@pytest.mark.parametrize("label", ["../../thesis", "a/b", "", ".", ".hidden"])
+def test_a_label_names_a_file_of_the_page(read_rows, label):
+    with pytest.raises(ConfigurationError, match="cannot name a file"):
+        read_rows(f'[[section]]\ntitle = "s"\nrows = [{{ label = "{label}", about = "x" }}]')
+
+
 def test_a_page_made_of_its_copies_removes_none_of_them(out, read_rows):
     before = sorted(out.rglob("*"))
     row = '[[section]]\ntitle = "s"\nrows = [{ label = "paired", about = "x" }]'

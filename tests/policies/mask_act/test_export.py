@@ -1,15 +1,18 @@
 import json
 import re
 from functools import wraps
+from unittest.mock import Mock
 
 import pytest
 import torch
 from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.policies.factory import make_pre_post_processors
+from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.policies.mask_act import export
 from lerobot_excav.policies.mask_act.export import export_checkpoint
 from lerobot_excav.policies.mask_act.model_card import CardFacts
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
@@ -90,6 +93,16 @@ def test_an_export_stands_in_a_folder_of_its_own(checkpoint, exported):
         with pytest.raises(ConfigurationError, match=rf"out={folder} exists; choose another"):
             export_checkpoint(checkpoint, folder)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_export_that_fails_leaves_nothing(checkpoint, tmp_path, monkeypatch):
+    (tmp_path / "out").mkdir()  # empty, so it may become the export
+    with monkeypatch.context() as patch:
+        patch.setattr(export, "save_file", Mock(side_effect=SafetensorError("No space left (os error 28)")))
+        with pytest.raises(ConfigurationError, match=r"out=\S*out cannot be written: No space left .* free some space"):
+            export_checkpoint(checkpoint, tmp_path / "out")
+    assert not list(tmp_path.glob(".*"))
+    assert (export_checkpoint(checkpoint, tmp_path / "out") / WEIGHTS).is_file()
 
 
 def change_tensors(change):

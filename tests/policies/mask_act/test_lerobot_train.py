@@ -1,6 +1,7 @@
 """mask_act through the stock `lerobot-train`: train, resume, fine-tune, load."""
 
 import json
+import shlex
 import sys
 
 import pytest
@@ -12,6 +13,7 @@ from lerobot.scripts import lerobot_train
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
+from lerobot_excav.policies.mask_act.training_masks import SAFE_TRANSFORMS
 
 from ..conftest import record, train
 
@@ -80,3 +82,12 @@ def test_a_dataset_without_masks_trains_the_no_condition_variant_only(dataset, c
         with pytest.raises(ConfigurationError, match=r"no .*'observation.images.target_mask'.*withhold_mask=true"):
             train(unmasked, tmp_path / name, *policy, "--steps=1")
     assert train(unmasked, tmp_path / "blind", *NEW, "--policy.withhold_mask=true", "--steps=1").is_dir()
+
+
+def test_transforms_that_part_mask_and_picture_end_training_and_the_named_ones_do_not(dataset, tmp_path):
+    moving = ["--dataset.image_transforms.enable=true", "--dataset.image_transforms.max_num_transforms=6"]
+    with pytest.raises(ConfigurationError, match="is not the one that the dataset holds") as refusal:
+        train(dataset, tmp_path / "moved", *NEW, *moving, "--steps=1")
+    assert SAFE_TRANSFORMS in str(refusal.value)
+    still = [*shlex.split(SAFE_TRANSFORMS), "--policy.augment_shift_px=2"]
+    assert settings(train(dataset, tmp_path / "still", *NEW, *still, "--steps=1"))["augment_shift_px"] == 2

@@ -63,6 +63,23 @@ def test_forward_leaves_the_batch_alone_and_every_parameter_gets_a_gradient(poli
     assert [name for name, p in agent.named_parameters() if p.grad is None] == []
 
 
+def test_a_training_step_in_bfloat16_is_close_to_one_in_float32(policy, batch):
+    agent, data = (
+        policy(target_token=True, use_vae=True, kl_weight=0.0, augment_shift_px=2).train(),
+        batch(actions=True),
+    )
+    losses = []
+    for is_enabled in (False, True):
+        torch.manual_seed(0)
+        with torch.autocast("cpu", torch.bfloat16, enabled=is_enabled):
+            losses.append(agent.forward(data)[0])
+        agent.zero_grad()
+        losses[-1].backward()
+        assert all(torch.isfinite(p.grad).all() for p in agent.parameters() if p.grad is not None)
+    assert losses[1].dtype == torch.float32
+    assert losses[1].item() == pytest.approx(losses[0].item(), rel=0.02)
+
+
 def test_training_cuts_masks_of_lossy_videos_at_one_half(policy, batch):
     agent, data = policy(target_token=True), batch(actions=True)
     lossy = {**data, MASK: 0.49 + 0.02 * data[MASK]}

@@ -106,3 +106,50 @@ def test_a_mask_that_is_not_binary_is_refused_even_while_a_plan_lasts(awake, bat
     for act in (agent.select_action, agent.predict_action_chunk):
         with pytest.raises(ConfigurationError, match="not binary"):
             act(observation)
+
+
+@pytest.mark.parametrize("settings", [{}, {"temporal_ensemble_coeff": 0.01}])
+def test_actions_are_float32_where_autocast_computes_in_bfloat16(awake, batch, settings):
+    agent, observation = awake(**settings), batch()
+    with torch.autocast("cpu", torch.bfloat16):
+        actions = [agent.select_action(observation), agent.predict_action_chunk(observation)]
+    # The plan lasts, and another one follows, without it; and the other way round.
+    actions.append(agent.select_action(observation))
+    other = {**observation, MASK: observation[MASK].flip(-1)}
+    actions.append(agent.select_action(other))
+    with torch.autocast("cpu", torch.bfloat16):
+        actions += [agent.select_action(other), agent.select_action(observation)]
+    assert {action.dtype for action in actions} == {torch.float32}
+    assert all(torch.isfinite(action).all() for action in actions)
+
+
+QUEUES_OF_UPSTREAM = ("_queues", "_action_queue")
+
+
+def drop_queued_actions(policy):
+    """What LeRobot's main branch does, in a method of every policy, when an instruction changes."""
+    for name in QUEUES_OF_UPSTREAM:
+        queue = getattr(policy, name, None)
+        if isinstance(queue, dict):
+            queue["action"].clear()
+        elif queue is not None:
+            queue.clear()
+
+
+def queued_action_count(policy):
+    """What it asks to know whether the next action comes from a new plan."""
+    return max(len(getattr(policy, name, ())) for name in QUEUES_OF_UPSTREAM)
+
+
+@pytest.mark.parametrize(("settings", "left"), [({}, 7), ({"temporal_ensemble_coeff": 0.01}, 0)])
+def test_lerobots_drop_queued_actions_makes_a_new_plan(counted, batch, settings, left):
+    agent, sizes = counted(**settings)
+    agent.select_action(batch(seed=1))
+    assert queued_action_count(agent) == left
+    drop_queued_actions(agent)
+    assert queued_action_count(agent) == 0
+    sizes.clear()
+    observation = batch(seed=2)
+    action = agent.select_action(observation)
+    assert sizes == [3]
+    torch.testing.assert_close(action, agent.predict_action_chunk(observation)[:, 0])

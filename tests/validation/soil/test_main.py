@@ -55,6 +55,27 @@ def test_values_and_report_are_written(asked, tmp_path, capsys):
     assert str(report) in capsys.readouterr().out
 
 
+def test_only_an_earlier_report_is_replaced(asked, tmp_path, capsys):
+    report, values = tmp_path / "report.md", tmp_path / "soil.json"
+    for _ in range(2):
+        assert main(["--only=T1", f"--report={report}"]) == 0
+    (tmp_path / "thesis.md").write_text("# Written by me")
+    values.write_text("mine")
+    for option, name in (("report", "thesis.md"), ("json", "soil.json")):
+        with pytest.raises(SystemExit):
+            main(["--only=T1", f"--{option}={tmp_path / name}"])
+        assert f"{name} exists, and is not a report of this command" in capsys.readouterr().err
+    assert (values.read_text(), (tmp_path / "thesis.md").read_text()) == ("mine", "# Written by me")
+
+
+def test_pictures_of_another_report_are_kept(asked, tmp_path, capsys):
+    (tmp_path / "images" / "soil").mkdir(parents=True)
+    (tmp_path / "images" / "soil" / "heap.png").write_text("mine")
+    with pytest.raises(SystemExit):
+        main(["--only=T1", f"--report={tmp_path / 'report.md'}"])
+    assert "images/soil holds pictures" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "named"),
     [

@@ -2,9 +2,12 @@
 
 from typing import TYPE_CHECKING, Any, override
 
+from pydantic import Field
+
 from lerobot_excav.envs.machines.fr5.layout import NO_BLOCK
 from lerobot_excav.envs.tasks.grasp.spec import TASK_STATE_NAMES
 from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
+from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,9 +20,10 @@ class GraspRecord(EpisodeRecord):
     """Outcome of one grasping episode; where the command changed, the last one counts."""
 
     episode_return: float  # sum of the rewards
-    first_grasped_block: int  # first block that the fingers lifted since the last command; -1 if they lifted none
+    # First block that the fingers lifted since the last command; -1 if they lifted none.
+    first_grasped_block: int = Field(ge=NO_BLOCK, lt=TARGETS_PER_SCENE)
     target_in_tray: bool  # whether the commanded block rests in the tray
-    blocks_in_tray: int  # how many blocks do
+    blocks_in_tray: int = Field(ge=0, le=TARGETS_PER_SCENE)  # how many blocks do
 
     @property
     def grasped(self) -> str:

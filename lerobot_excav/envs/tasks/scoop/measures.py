@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from pydantic import NonNegativeInt
+
 from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TaskMeasures
 from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 
@@ -18,8 +20,8 @@ class ScoopRecord(EpisodeRecord):
     target_success: bool  # whether loading began inside the commanded patch
     retained_mass_kg: float  # soil brought into the box [kg]
     residual_bucket_mass_kg: float  # soil left in the bucket [kg]
-    hard_target_contacts: int  # hard contacts with the box
-    spill_before_target_events: int  # losses of soil on the way
+    hard_target_contacts: NonNegativeInt  # hard contacts with the box
+    spill_before_target_events: NonNegativeInt  # losses of soil on the way
 
     @property
     def has_hard_contact(self) -> bool:
