@@ -136,7 +136,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         """
         if self._env is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
-        self._log.open()
+        self._log.start()
         self._order = self._make_order()
         try:
             self._env = self.make_env()

@@ -250,9 +250,10 @@ JOYSTICK = {
     "reinitialise_button": one_of("back", *BUTTONS),  # start is the other one
     "next_scene_button": one_of("start", *BUTTONS),
     "device_name": optional(text),
-    "device_index": whole(0, 255),
-    "joystick_axes": optional(numbered(*AXES)),
-    "joystick_buttons": optional(numbered("back", "start")),
+    "device_index": optional(whole(0, 255)),
+    # One without the other says nothing.
+    "joystick_axes": numbered(*AXES).beside(joystick_buttons={"back": 6, "start": 7}),
+    "joystick_buttons": numbered("back", "start").beside(joystick_axes={axis: n for n, axis in enumerate(AXES)}),
 }
 SCENES = {
     "first_scene": whole(0, ENDLESS).beside(scenes=1),
