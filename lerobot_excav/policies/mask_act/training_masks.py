@@ -62,8 +62,8 @@ class TrainingMasks:
         self._has_stats = "max" in stats and "min" in stats
         if self._has_stats:
             require_target(str(self._key), float(np.min(stats["min"])), float(np.max(stats["max"])))
-        self._is_comparing = config.compare_masks and self._meta is not None
-        if self._is_comparing and self._key is None:
+        self._is_comparing = config.compare_masks
+        if self._is_comparing and self._meta is not None and self._key is None:
             self._stop_comparing("--rename_map gives several pictures of the dataset new names")
 
     def check(self, batch: Batch, mask: Tensor) -> None:
@@ -89,6 +89,9 @@ class TrainingMasks:
                 self._compare(batch, mask, row)
 
     def _compare(self, batch: Batch, mask: Tensor, row: int) -> None:
+        if self._meta is None:
+            self._stop_comparing("the policy was built without its dataset; give make_policy its ds_meta")
+            return
         if not {"index", "episode_index"} <= batch.keys():
             self._stop_comparing("the batches have no index and episode_index")
             return

@@ -231,8 +231,9 @@ def test_masks_that_say_nothing_in_any_frame_are_refused_before_training(tmp_pat
     trained_on(dataset, withhold_mask=True).forward(frames(dataset, range(4)))
 
 
-def test_masks_of_0_and_1_are_refused_without_statistics_too(policy, batch):
+def test_masks_of_0_and_1_are_refused_without_statistics_too(policy, batch, caplog):
     agent, data = policy().train(), batch(actions=True)
     agent.forward({**data, MASK: torch.zeros_like(data[MASK])})
+    assert "built without its dataset" in caplog.text
     with pytest.raises(ConfigurationError, match=r"target_mask holds 0 and 0\.00392.*255"):
         agent.forward({**data, MASK: data[MASK] / 255})
