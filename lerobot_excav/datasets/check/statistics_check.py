@@ -20,7 +20,7 @@ TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-4
 """The same for an element that hardly changes, in its own unit (guess)."""
 STD_ROUNDING = 5e-3
-"""Besides, what a std may be off, as share of the mean: LeRobot subtracts squares in float32 (kind: measured, the arm)."""
+"""What a std may be off besides, as share of the mean: LeRobot subtracts squares in float32 (kind: measured)."""
 NEXT_STEP = "make them again with `lerobot-edit-dataset --operation.type=recompute_stats`"
 
 
