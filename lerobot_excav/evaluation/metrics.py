@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from lerobot_excav.datasets.format.validated import validated
 from lerobot_excav.envs.tasks.measures import EpisodeKey, EpisodeRecord, TaskMeasures
 from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.errors import ConfigurationError, DatasetError
-from lerobot_excav.evaluation.validated import validated
 
 
 @dataclass(frozen=True, kw_only=True)

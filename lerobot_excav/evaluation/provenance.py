@@ -9,8 +9,8 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict
 
+from lerobot_excav.datasets.format.validated import validated
 from lerobot_excav.evaluation.training import TrainingFacts, read_training
-from lerobot_excav.evaluation.validated import validated
 
 
 class EvaluationOrigin(BaseModel):

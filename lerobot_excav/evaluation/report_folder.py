@@ -13,8 +13,8 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict
 
+from lerobot_excav.datasets.format.validated import validated
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.validated import validated
 from lerobot_excav.whole_file import write_whole
 
 LIST = "report_files.json"

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from lerobot_excav.datasets.format.validated import validated
 from lerobot_excav.evaluation.training_log import read_training_log
-from lerobot_excav.evaluation.validated import validated
 
 
 class TrainingFacts(BaseModel):

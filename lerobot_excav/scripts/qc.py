@@ -1,7 +1,7 @@
-"""Check a dataset: columns, values, masks, paired starts, and replays of some episodes.
+"""Check a dataset: files, columns, pictures, facts, paired starts, statistics, and replays of some episodes.
 
-Exit code 0 if every episode passes, 1 if one fails. The verdicts go into the index, and episodes that failed are not
-chosen by `lerobot-excav index --select`.
+Exit code 0 if nothing is found, 1 if an episode or the dataset as a whole fails. The verdicts go into the index, and
+episodes that failed are not chosen by `lerobot-excav index --select`.
 
 Examples:
   lerobot-excav qc outputs/paired
@@ -12,6 +12,7 @@ Examples:
       check three episodes, and replay them all
 """
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
@@ -52,18 +53,34 @@ class QcArguments(DatasetArguments):
 
 def run(arguments: QcArguments) -> int:
     """Check, and print the verdicts."""
-    from lerobot_excav.datasets.check.quality_check import check_dataset
+    from lerobot_excav.datasets.check.quality_check import check_dataset, note_verdicts
     from lerobot_excav.datasets.pairs.paired_index import FAILED
+    from lerobot_excav.errors import DatasetError
 
-    rows = check_dataset(arguments.root, episodes=arguments.episodes, replays=arguments.replays, seed=arguments.seed)
+    report = check_dataset(
+        arguments.root,
+        episodes=arguments.episodes,
+        replays=arguments.replays,
+        seed=arguments.seed,
+        show_progress=True,
+    )
+    rows = report.episodes
     failed = rows[rows["qc"] == FAILED]
-    if failed.empty:
+    for problem in report.problems:
+        print(f"dataset: {problem}")
+    if not failed.empty:
+        print("\n".join(failure_table(failed)))
+        print(f"{len(failed)} of {len(rows)} episodes failed")
+    elif report.problems:
+        print(f"the dataset failed; in its {len(rows)} episodes that can be read by themselves nothing was found")
+    else:
         replayed = int(rows["replayed"].sum())
         print(f"{len(rows)} of {len(rows)} episodes passed; {replayed} of them were replayed")
-        return 0
-    print("\n".join(failure_table(failed)))
-    print(f"{len(failed)} of {len(rows)} episodes failed")
-    return 1
+    try:
+        note_verdicts(arguments.root, report)
+    except DatasetError as error:
+        print(f"lerobot-excav qc: the verdicts are not noted in the index: {error}", file=sys.stderr)
+    return 0 if report.has_passed else 1
 
 
 def failure_table(failed: "pd.DataFrame") -> list[str]:

@@ -39,6 +39,15 @@ def changing_datasets(tmp_path_factory):
     return {storage: folder / storage for storage in ("image", "video")}
 
 
+@pytest.fixture(scope="session")
+def small_datasets(tmp_path_factory):
+    """Two scenes with two targets, by storage. Not to be changed by tests."""
+    folder = tmp_path_factory.mktemp("small")
+    for storage in ("image", "video"):
+        record_toy(folder / storage, scenes=2, targets=2, storage=storage)
+    return {storage: folder / storage for storage in ("image", "video")}
+
+
 @pytest.fixture
 def command_changes(monkeypatch):
     """Let the task command another spot within every episode."""

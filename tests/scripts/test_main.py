@@ -45,16 +45,13 @@ def test_an_unknown_command_is_refused(capsys):
 
 def test_an_error_is_one_line_and_exit_code_2(capsys, tmp_path):
     (tmp_path / "file").write_text("")
-    for folder, problem in (
-        (tmp_path, f"{tmp_path} is not a LeRobot dataset: it has no meta/info.json"),
-        (
-            tmp_path / "file",
-            f"{tmp_path / 'file/meta/info.json'}: Not a directory; "
-            "check the path; a part of it is a file, not a folder",
-        ),
-    ):
+    assert main(["index", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert error == f"lerobot-excav index: {tmp_path} is not a LeRobot dataset: it has no meta/info.json\n"
+    for folder in (tmp_path / "file", tmp_path / "nowhere"):
         assert main(["qc", str(folder)]) == 2
-        assert capsys.readouterr().err == f"lerobot-excav qc: {problem}\n"
+        error = capsys.readouterr().err
+        assert error == f"lerobot-excav qc: {folder} is not a folder; give the folder of a dataset\n"
     for command, missing in (("qc", "dataset"), ("demos", "--out"), ("operator", "--metrics")):
         assert main([command]) == 2
         assert f"{missing} is missing" in capsys.readouterr().err

@@ -1,11 +1,23 @@
 """Checks of one recorded episode that need no simulation."""
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from lerobot_excav.datasets.format.episode_table import EpisodeTable
-from lerobot_excav.datasets.format.schema import MASK_KEY, STATE_KEY, TASK_STATE_KEY, camera_key
+from lerobot_excav.datasets.format.schema import (
+    MASK_KEY,
+    MASK_SOURCE_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    SIMULATION_KEY,
+    TARGET_KEY,
+    camera_key,
+)
+from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
+from lerobot_excav.envs.tasks.settings import LAST_SCENE, SCENE_SETS
+from lerobot_excav.errors import ConfigurationError, DatasetError
 
 MAIN_KEY = camera_key("main")
 OVERLAY = "as overlay"
@@ -19,18 +31,57 @@ ACTION_MARGIN = 0.1
 environments clip it. More speaks of another unit (guess)."""
 
 
-def episode_problems(episode: EpisodeTable) -> list[str]:
-    """Describe in plain words what is wrong with an episode that has all columns of the index and `frame_index`."""
-    return [*_number_problems(episode), *_mask_problems(episode)]
+MASK_WORDS = re.compile(
+    rf"[^,]+(, ({'|'.join(MASK_CONDITIONS[1:])}))?(, ({'|'.join(MASK_NOISES[1:])}) [1-9][0-9]* px)?(, {OVERLAY})?"
+)
+"""What `TaskSettings.mask_words` can be; a source may be of a package that is not installed here."""
 
 
-def _number_problems(episode: EpisodeTable) -> Iterator[str]:
-    frames = episode.array("frame_index")
-    if not np.array_equal(frames, np.arange(episode.length)):
-        yield f"frames are not numbered 0 to {episode.length - 1}"
-    for name, values in ((STATE_KEY, episode.state), ("action", episode.action), (TASK_STATE_KEY, episode.task_state)):
-        if not np.isfinite(values).all():
-            yield f"{name} is not finite at frame {int(np.argmin(np.isfinite(values).all(axis=1)))}"
+def fact_problems(episode: EpisodeTable) -> Iterator[str]:
+    """Describe in plain words which facts of an episode, that have all columns, contradict each other or cannot be."""
+    for find in (_version_problems, _pair_problems, _setting_problems, _mask_word_problems, _outcome_problems):
+        try:
+            yield from find(episode)
+        except DatasetError as contradiction:
+            yield str(contradiction).removeprefix(f"episode {episode.index}: ")
+
+
+def _version_problems(episode: EpisodeTable) -> Iterator[str]:
+    version, known = episode.simulation_version, episode.spec.changes
+    if version not in known:
+        yield f"{SIMULATION_KEY}={version} is not known; this package knows the versions up to {max(known)}"
+
+
+def _pair_problems(episode: EpisodeTable) -> Iterator[str]:
+    pair, targets = episode.pair, episode.spec.target_count
+    if pair.scene_set not in SCENE_SETS:
+        yield f"{PAIR_KEY}={pair.uid!r} has an unknown scene set; allowed: {', '.join(SCENE_SETS)}"
+    if pair.scene_id > LAST_SCENE:
+        yield f"{SCENE_KEY}={pair.scene_id} is not possible; the last scene is {LAST_SCENE}"
+    wrong = [target for target in np.unique(episode.target_id).tolist() if not 0 <= target < targets]
+    if wrong:
+        yield f"{TARGET_KEY}={wrong[0]} is not possible; allowed are 0 to {targets - 1}"
+
+
+def _setting_problems(episode: EpisodeTable) -> Iterator[str]:
+    try:
+        episode.spec.make_settings(**episode.settings)
+    except ConfigurationError as error:
+        yield f"excav.{error}"
+
+
+def _mask_word_problems(episode: EpisodeTable) -> Iterator[str]:
+    if not MASK_WORDS.fullmatch(episode.mask_words):
+        yield f"{MASK_SOURCE_KEY}={episode.mask_words!r} is not possible; such as 'oracle, shift 2 px, {OVERLAY}' is"
+
+
+def _outcome_problems(episode: EpisodeTable) -> Iterator[str]:
+    _ = episode.success  # one per episode
+    yield from ()
+
+
+def action_problems(episode: EpisodeTable) -> Iterator[str]:
+    """Describe in plain words which actions are outside of their limits."""
     names = episode.spec.action_names
     for name, values, low, high in zip(
         names, episode.action.T, episode.spec.action_low, episode.spec.action_high, strict=True
@@ -42,8 +93,11 @@ def _number_problems(episode: EpisodeTable) -> Iterator[str]:
             yield f"action {name} reaches {worst:.3g}; allowed are {low:.3g} to {high:.3g}"
 
 
-def _mask_problems(episode: EpisodeTable) -> Iterator[str]:
-    """Check the mask under each command: it changes with the command and then only, is binary and marks something."""
+def mask_problems(episode: EpisodeTable) -> Iterator[str]:
+    """Check the mask under each command: it changes with the command and then only, is binary and marks something.
+
+    Its pictures can be decoded.
+    """
     starts = [0, *(frame for frame, _ in episode.schedule)]
     digests = episode.image_digests(MASK_KEY)
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):

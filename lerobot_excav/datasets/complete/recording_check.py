@@ -7,7 +7,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.complete.session import SessionEpisode
-from lerobot_excav.datasets.format.episode_table import iterate_episodes, read_info
+from lerobot_excav.datasets.format.dataset_info import read_info
+from lerobot_excav.datasets.format.episode_table import iterate_episodes
 from lerobot_excav.datasets.format.schema import MASK_KEY, excav_features, require_columns
 from lerobot_excav.datasets.format.version_check import require_this_simulation
 from lerobot_excav.datasets.record.simulation import make_environment

@@ -22,7 +22,8 @@ from lerobot_excav.datasets.complete.recording_check import (
 from lerobot_excav.datasets.complete.session import SessionEpisode, read_session
 from lerobot_excav.datasets.complete.statistics import write_statistics
 from lerobot_excav.datasets.format import schema
-from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
+from lerobot_excav.datasets.format.dataset_info import read_info
+from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes
 from lerobot_excav.datasets.pairs.paired_index import write_index
 from lerobot_excav.datasets.record.assembly import constant_columns
 from lerobot_excav.datasets.record.episode import Episode

@@ -3,7 +3,6 @@
 LeRobot's own reader first copies all pictures into a cache; what the index and the checks need is a small part of them.
 """
 
-import json
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,18 +11,17 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format import schema
+from lerobot_excav.datasets.format.dataset_info import INFO_PATH, DatasetInfo, read_info
+from lerobot_excav.datasets.format.frame_files import EpisodeRows, Report, iterate_rows, raise_damage
+from lerobot_excav.datasets.format.metadata import EpisodeMetadata, read_episode_metadata
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.pictures import Pictures, StoredImages, VideoSpan
-from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
-
-CODEBASE_VERSION = "v3.0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,8 +128,15 @@ class EpisodeTable:
         return replace(self, length=1, columns=first, pictures=pictures)
 
     def image(self, key: str, frame: int) -> NDArray[Any]:
-        """Return a decoded picture, (H, W, 3) uint8."""
-        return self.pictures[key].frame(frame)
+        """Return a decoded picture, (H, W, 3) uint8.
+
+        Raises:
+            DatasetError: It is damaged.
+        """
+        try:
+            return self.pictures[key].frame(frame)
+        except DatasetError as damage:
+            raise DatasetError(f"episode {self.index}: {key}: {damage}") from damage
 
     def image_digests(self, key: str) -> list[bytes]:
         """Return a digest of every picture; equal pictures of one writer have equal digests."""
@@ -146,103 +151,60 @@ class EpisodeTable:
         return values[0]
 
 
-@dataclass(frozen=True, kw_only=True)
-class DatasetInfo:
-    """What `meta/info.json` says.
+def iterate_episodes(
+    root: Path,
+    keys: Sequence[str],
+    *,
+    episodes: Collection[int] | None = None,
+    report: Report = raise_damage,
+) -> Iterator[EpisodeTable]:
+    """Go through a dataset's episodes in the order of their files; frames come in order.
 
-    Attributes:
-        fps: Frames per second.
-        total_episodes: Number of episodes.
-        features: Feature descriptions by key.
-        robot_type: Which robot it is of.
-        video_path: Pattern of the paths of its videos; None if it has none.
-    """
-
-    fps: int
-    total_episodes: int
-    features: dict[str, Any]
-    robot_type: str | None
-    video_path: str | None
-
-    @property
-    def spec(self) -> TaskSpec:
-        """Task of the robot that the dataset was recorded with; all tasks of a robot share its columns.
-
-        Raises:
-            DatasetError: It was recorded with another robot.
-        """
-        return task_of_robot(self.robot_type)
-
-
-def read_info(root: Path) -> DatasetInfo:
-    """Read what a dataset on disk says about itself.
+    Args:
+        root: The dataset.
+        keys: Columns and pictures to read.
+        episodes: Episodes to read; all by default.
+        report: What is done about files that cannot be read, see `iterate_rows`.
 
     Raises:
-        DatasetError: There is no dataset, or it has another format.
+        DatasetError: A file or a column of what is asked for is missing, damaged or of another kind than declared.
     """
-    try:
-        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise DatasetError(f"{root} is not a LeRobot dataset: it has no meta/info.json") from None
-    if info["codebase_version"] != CODEBASE_VERSION:
-        raise DatasetError(
-            f"{root} has the format {info['codebase_version']}; this needs {CODEBASE_VERSION}, so convert it"
-        )
-    wanted = ("fps", "total_episodes", "features", "robot_type", "video_path")
-    return DatasetInfo(**{name: info.get(name) for name in wanted})
-
-
-def iterate_episodes(
-    root: Path, keys: Sequence[str], *, episodes: Collection[int] | None = None
-) -> Iterator[EpisodeTable]:
-    """Go through a dataset's episodes, all by default, in the order of their files; frames come in order."""
     info = read_info(root)
-    wanted = set(range(info.total_episodes) if episodes is None else episodes)
-    stored = {kind: [key for key in keys if _dtype(info, key) == kind] for kind in ("image", "video")}
-    spans = _video_spans(root, info, stored["video"])
-    columns = [key for key in keys if key not in stored["video"]]
-    for path in sorted(root.glob("data/*/*.parquet")):
-        for index, rows in _episodes_of_file(path, columns, wanted):
-            yield EpisodeTable(
-                index=index,
-                length=rows.num_rows,
-                spec=info.spec,
-                columns={key: rows[key] for key in columns if key not in stored["image"]},
-                pictures={**{key: StoredImages(rows[key]) for key in stored["image"]}, **spans.get(index, {})},
+    undeclared = [key for key in keys if key not in info.features]
+    if undeclared:
+        raise DatasetError(f"{root / INFO_PATH} declares no {', '.join(undeclared)}")
+    videos = [key for key in keys if key in info.keys_of("video")]
+    metadata = read_episode_metadata(root, info) if videos else []
+    stored = [key for key in keys if key not in videos]
+    for rows in iterate_rows(root, info, stored, episodes=episodes, report=report):
+        if rows.problems:
+            raise DatasetError(f"episode {rows.index}: {'; '.join(rows.problems)}")
+        yield episode_table(root, info, rows, metadata[rows.index] if videos else None, keys)
+
+
+def episode_table(
+    root: Path, info: DatasetInfo, rows: EpisodeRows, metadata: EpisodeMetadata | None, keys: Sequence[str]
+) -> EpisodeTable:
+    """Make the table of an episode from rows that have no problems; without metadata it has no videos."""
+    pictures: dict[str, Pictures] = {
+        key: StoredImages(rows.table[key], info.size_of(key)) for key in keys if key in info.keys_of("image")
+    }
+    for key, place in metadata.videos.items() if metadata else ():
+        if key in keys:
+            pictures[key] = VideoSpan(
+                path=info.video_file(root, key, place.chunk_index, place.file_index),
+                start_s=place.from_timestamp,
+                fps=info.fps,
+                length=rows.table.num_rows,
+                size=info.size_of(key),
             )
-
-
-def _dtype(info: DatasetInfo, key: str) -> str:
-    return str(info.features.get(key, {}).get("dtype", ""))
-
-
-def _video_spans(root: Path, info: DatasetInfo, keys: Sequence[str]) -> dict[int, dict[str, VideoSpan]]:
-    """Find where the videos of every episode lie."""
-    if not keys or info.video_path is None:
-        return {}
-    parts = ("chunk_index", "file_index", "from_timestamp")
-    columns = ["episode_index", "length", *(f"videos/{key}/{part}" for key in keys for part in parts)]
-    spans: dict[int, dict[str, VideoSpan]] = {}
-    for path in sorted(root.glob("meta/episodes/*/*.parquet")):
-        for row in pq.read_table(path, columns=columns).to_pylist():
-            for key in keys:
-                chunk, file, start_s = (row[f"videos/{key}/{part}"] for part in parts)
-                place = info.video_path.format(video_key=key, chunk_index=chunk, file_index=file)
-                span = VideoSpan(path=root / place, start_s=start_s, fps=info.fps, length=row["length"])
-                spans.setdefault(row["episode_index"], {})[key] = span
-    return spans
-
-
-def _episodes_of_file(path: Path, keys: Sequence[str], wanted: set[int]) -> Iterator[tuple[int, pa.Table]]:
-    parquet = pq.ParquetFile(path)
-    columns = list(dict.fromkeys([*keys, "episode_index", "frame_index"]))
-    for group in range(parquet.num_row_groups):
-        # LeRobot writes one row group per episode; a file written by something else just costs more memory.
-        table = parquet.read_row_group(group, columns=columns)
-        for index in pc.unique(table["episode_index"]).to_pylist():
-            if index in wanted:
-                rows = table.filter(pc.equal(table["episode_index"], index)).sort_by("frame_index")
-                yield index, rows
+    return EpisodeTable(
+        index=rows.index,
+        length=rows.table.num_rows,
+        spec=info.spec,
+        columns={key: rows.table[key] for key in keys if key in rows.table.column_names and key not in pictures},
+        pictures=pictures,
+    )
 
 
 def require_single_task(root: Path, episodes: Collection[int]) -> None:

@@ -1,8 +1,12 @@
 """The name of one scene shown with one target."""
 
+import re
 from typing import NamedTuple
 
 from lerobot_excav.errors import DatasetError
+
+_NUMBER = "(0|[1-9][0-9]{0,18})"
+_UID = re.compile(f"([^/]+)/([^/]+)/{_NUMBER}/{_NUMBER}")
 
 
 class Pair(NamedTuple):
@@ -25,10 +29,9 @@ class Pair(NamedTuple):
         Raises:
             DatasetError: It has another form.
         """
-        parts = uid.split("/")
-        if len(parts) == 4 and parts[2].isdecimal() and parts[3].isdecimal():
-            return cls(parts[0], parts[1], int(parts[2]), int(parts[3]))
+        if found := _UID.fullmatch(uid):
+            return cls(found[1], found[2], int(found[3]), int(found[4]))
         raise DatasetError(
-            f"excav.pair_uid={uid!r} is not of the form env/scene_set/scene_id/target_id; "
+            f"excav.pair_uid={uid!r:.100} is not of the form env/scene_set/scene_id/target_id; "
             "rebuild the column with `lerobot-excav index DATASET --session=FILE`"
         )

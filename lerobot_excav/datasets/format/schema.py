@@ -8,7 +8,9 @@ are ordinary per-frame columns, the only carrier that survives delete, split, me
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NotRequired, TypedDict
+
+from pydantic import ConfigDict, PositiveInt, with_config
 
 from lerobot_excav.datasets.format.storage import require_lossless
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -24,7 +26,16 @@ TASK_STATE_KEY = "excav.task_state"
 SUCCESS_KEY = "excav.success"
 MASK_SOURCE_KEY = "excav.mask_source"
 SIMULATION_KEY = "excav.simulation_version"
-Feature = dict[str, Any]
+
+
+@with_config(ConfigDict(extra="allow"))
+class Feature(TypedDict):
+    """How LeRobot describes a column; there may be more in it, which stays."""
+
+    dtype: str
+    shape: tuple[PositiveInt, ...]
+    names: list[Any] | dict[str, Any] | None
+    info: NotRequired[dict[str, Any] | None]
 
 
 def camera_key(camera: str) -> str:
@@ -35,6 +46,16 @@ def camera_key(camera: str) -> str:
 def setting_key(name: str) -> str:
     """Return the dataset key of a setting that is kept in every frame, such as the soil."""
     return f"excav.{name}"
+
+
+NUMBERING: dict[str, Feature] = {
+    "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
+    **{
+        key: {"dtype": "int64", "shape": (1,), "names": None}
+        for key in ("frame_index", "episode_index", "index", "task_index")
+    },
+}
+"""The columns that LeRobot adds to every dataset."""
 
 
 def excav_features(spec: TaskSpec) -> dict[str, Feature]:
@@ -100,9 +121,23 @@ def require_columns(spec: TaskSpec, features: dict[str, Feature]) -> None:
             raise DatasetError(f"{key}: {problem}")
 
 
+def require_numbering(features: dict[str, Feature]) -> None:
+    """Check that a dataset has the columns that LeRobot itself adds, with the right types.
+
+    Raises:
+        DatasetError: A column is missing or is of another type.
+    """
+    for key, expected in NUMBERING.items():
+        problem = _difference(features[key], expected) if key in features else "the dataset lacks it"
+        if problem:
+            raise DatasetError(f"{key}: {problem}; LeRobot cannot read such a dataset")
+
+
 def _difference(found: Feature, expected: Feature) -> str:
     if found["dtype"] != expected["dtype"]:
         return f"dtype={found['dtype']!r} instead of {expected['dtype']!r}"
+    if (found.get("info") or {}).get("is_depth_map", False):
+        return "is_depth_map=True, so LeRobot takes its pictures for distances"
     if expected["dtype"] != "image" and tuple(found["shape"]) != expected["shape"]:
         return f"shape={tuple(found['shape'])} instead of {expected['shape']}"
     if expected["names"] is not None and list(found["names"] or []) != expected["names"]:

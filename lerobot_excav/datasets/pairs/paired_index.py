@@ -11,16 +11,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format import schema
-from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes, read_info
+from lerobot_excav.datasets.format.dataset_info import read_info
+from lerobot_excav.datasets.format.episode_table import EpisodeTable, iterate_episodes
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import whole_file
 
 INDEX_PATH = Path("meta/excav_pairs.parquet")
 
-UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
+VERDICTS = UNCHECKED, PASSED, FAILED = "unchecked", "passed", "failed"
 
 
 def index_keys(spec: TaskSpec) -> list[str]:
@@ -41,6 +45,8 @@ def build_index(root: Path) -> pd.DataFrame:
     info = read_info(root)
     schema.require_columns(info.spec, info.features)
     rows = [_row(episode) for episode in iterate_episodes(root, index_keys(info.spec))]
+    if not rows:
+        raise DatasetError(f"{root} has no episodes")
     index = pd.DataFrame(rows).sort_values("episode_index", ignore_index=True)
     return _with_verdicts(index, root / INDEX_PATH)
 
@@ -98,7 +104,24 @@ def fingerprint(episode: EpisodeTable) -> str:
 
 
 def _with_verdicts(index: pd.DataFrame, path: Path) -> pd.DataFrame:
-    if not path.is_file():
-        return index.assign(qc=UNCHECKED, qc_problem="")
-    known = pd.read_parquet(path).drop_duplicates("fingerprint").set_index("fingerprint")[["qc", "qc_problem"]]
-    return index.join(known, on="fingerprint").fillna({"qc": UNCHECKED, "qc_problem": ""})
+    """Add the verdicts that a stored index holds; what cannot be one is forgotten, as the index is only derived."""
+    known = _stored_verdicts(path)
+    verdicts = [known.get(trace, (UNCHECKED, "")) for trace in index["fingerprint"]]
+    return index.assign(qc=[verdict for verdict, _ in verdicts], qc_problem=[problem for _, problem in verdicts])
+
+
+def _stored_verdicts(path: Path) -> dict[str, tuple[str, str]]:
+    """Return verdict and problem by fingerprint."""
+    try:
+        with reading(path):
+            rows = pq.read_table(path, columns=["fingerprint", "qc", "qc_problem"]).to_pylist()
+    except DatasetError:
+        return {}
+    verdicts: dict[str, tuple[str, str]] = {}
+    for row in rows:
+        trace, verdict, problem = row["fingerprint"], row["qc"], row["qc_problem"]
+        is_verdict = isinstance(trace, str) and verdict in VERDICTS and isinstance(problem, str)
+        # A failure has a reason, and nothing else has one.
+        if is_verdict and (verdict == FAILED) == bool(problem):
+            verdicts.setdefault(trace, (verdict, problem))
+    return verdicts

@@ -9,8 +9,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from lerobot_excav.datasets.format.validated import validated
 from lerobot_excav.errors import ConfigurationError, require
-from lerobot_excav.evaluation.validated import validated
 
 CURVES = "curves"
 """Folder of the curves' metrics beside those of the rows, where a page keeps copies."""

@@ -8,7 +8,7 @@ import toy_reach.spec
 import toy_reach.table
 from lerobot.datasets import merge_datasets
 
-from lerobot_excav.datasets.check.quality_check import check_dataset
+from lerobot_excav.datasets.check.quality_check import check_dataset, note_verdicts
 from lerobot_excav.datasets.format.schema import SUCCESS_KEY, TARGET_KEY, TASK_STATE_KEY
 from lerobot_excav.datasets.pairs.paired_index import build_index
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -36,21 +36,25 @@ def tampered(paired_dataset, tmp_path):
 
 
 def problems(root, **options):
-    rows = check_dataset(root, **{"replays": 0, **options})
+    rows = check_dataset(root, **{"replays": 0, **options}).episodes
     return dict(rows[rows["qc"] == "failed"][["episode_index", "qc_problem"]].to_numpy().tolist())
 
 
 def test_the_episodes_asked_for_are_checked_and_the_index_says_so(paired_dataset, tmp_path):
     shutil.copytree(paired_dataset, tmp_path / "d")
-    rows = check_dataset(tmp_path / "d", episodes=[2, 5], replays=1)
-    assert rows["episode_index"].tolist() == [2, 5]
-    assert rows["replayed"].sum() == 1
+    report = check_dataset(tmp_path / "d", episodes=[2, 5], replays=1)
+    assert report.episodes["episode_index"].tolist() == [2, 5]
+    assert report.episodes["replayed"].sum() == 1
+    note_verdicts(tmp_path / "d", report)
     assert build_index(tmp_path / "d")["qc"].value_counts().to_dict() == {"unchecked": 17, "passed": 2}
     with pytest.raises(ConfigurationError, match=r"--episodes names \[19\]"):
         check_dataset(tmp_path / "d", episodes=[19])
     with pytest.raises(ConfigurationError, match="names no episode"):
         check_dataset(tmp_path / "d", episodes=[])
-    assert check_dataset(tmp_path / "d", replays=19)["replayed"].all()
+    report = check_dataset(tmp_path / "d", replays=19)
+    assert report.has_passed
+    assert report.episodes["replayed"].all()
+    note_verdicts(tmp_path / "d", report)
     assert build_index(tmp_path / "d")["qc"].tolist() == ["passed"] * 19
 
 
@@ -94,9 +98,13 @@ def test_what_is_wrong_is_found(tampered, key, change, expected):
     assert all(found[episode].startswith(problem) for episode, problem in expected.items())
 
 
-def test_contradicting_columns_are_refused(tampered):
-    with pytest.raises(DatasetError, match=r"episode 5: excav.scene_id changes within the episode"):
-        check_dataset(tampered("excav.scene_id", set_frames(9, slice(1))))
+def test_contradicting_columns_are_a_verdict_and_no_index_is_made(tampered):
+    root = tampered("excav.scene_id", set_frames(9, slice(1)))
+    report = check_dataset(root)
+    assert report.episodes["qc_problem"][5].startswith("excav.scene_id changes within the episode")
+    assert not report.has_passed
+    with pytest.raises(DatasetError, match=r"episode 5: excav\.scene_id changes within the episode"):
+        note_verdicts(root, report)
 
 
 def test_a_replay_by_another_simulation_is_found(paired_dataset, tmp_path, monkeypatch):
@@ -117,8 +125,10 @@ def test_sound_episodes_of_other_masks_and_tables_pass_also_together(tmp_path):
     for words, env in others.items():
         record_toy(tmp_path / words, scenes=1, env=env)
     merge_datasets([load(tmp_path / words) for words in others], "local/m", output_dir=tmp_path / "m")
-    rows = check_dataset(tmp_path / "m", replays=20)
-    assert rows["qc_problem"].tolist() == [""] * 20
+    report = check_dataset(tmp_path / "m", replays=20)
+    assert report.problems == []
+    assert report.episodes["qc_problem"].tolist() == [""] * 20
+    rows = build_index(tmp_path / "m")
     assert rows["table"].tolist() == ["ice"] * 4 + ["wood"] * 16
     assert rows["mask_source"].tolist() == [words for words in others for _ in range(4)]
 

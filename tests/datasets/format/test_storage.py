@@ -9,7 +9,8 @@ import toy_reach.env
 from lerobot.datasets import delete_episodes, merge_datasets, split_dataset
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
-from lerobot_excav.datasets.format.episode_table import iterate_episodes, read_info
+from lerobot_excav.datasets.format.dataset_info import read_info
+from lerobot_excav.datasets.format.episode_table import iterate_episodes
 from lerobot_excav.datasets.format.schema import PAIR_KEY, SCENE_KEY, TARGET_KEY
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index
@@ -65,7 +66,9 @@ def test_episode_tables_read_what_lerobot_reads(dataset):
 
 def test_a_dataset_with_changed_commands_passes_the_check_with_replays(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "d")
-    rows = check_dataset(tmp_path / "d", replays=8)
+    report = check_dataset(tmp_path / "d", replays=8)
+    assert report.problems == []
+    rows = report.episodes
     assert rows["qc_problem"].tolist() == [""] * 8
     assert rows["replayed"].all()
 
@@ -103,7 +106,7 @@ def test_a_mask_that_is_wrong_is_found(storage, tmp_path, monkeypatch, spoil, pr
 
     monkeypatch.setattr(toy_reach.env.ReachEnv, "_draw", spoiled)
     record_toy(tmp_path / "d", first_scene=1, scenes=1, targets=1, storage=storage)
-    assert check_dataset(tmp_path / "d", replays=0)["qc_problem"].tolist() == [problem]
+    assert check_dataset(tmp_path / "d", replays=0).episodes["qc_problem"].tolist() == [problem]
 
 
 def test_videos_and_commands_survive_lerobots_tools(changing_datasets, tmp_path):
@@ -116,9 +119,10 @@ def test_videos_and_commands_survive_lerobots_tools(changing_datasets, tmp_path)
     keys = (MAIN, PAIR_KEY, SCENE_KEY, TARGET_KEY)
     pictures = {episode.pair.uid: episode.image(MAIN, 5) for episode in iterate_episodes(original, keys)}
     for root, count in ((tmp_path / "d", 7), (tmp_path / "a", 2), (merged, 4)):
-        rows = check_dataset(root, replays=1)
-        assert rows["qc"].tolist() == ["passed"] * count
-        assert rows["commands"].tolist() == [2] * count
+        report = check_dataset(root, replays=1)
+        assert report.problems == []
+        assert report.episodes["qc"].tolist() == ["passed"] * count
+        assert build_index(root)["commands"].tolist() == [2] * count
         assert read_info(root).spec.id == "Reach-v0"
         for episode in iterate_episodes(root, keys):
             np.testing.assert_array_equal(episode.image(MAIN, 5), pictures[episode.pair.uid])

@@ -19,10 +19,25 @@ def validated[Model: BaseModel](
     try:
         return model.model_validate_json(text)
     except ValidationError as found:
-        errors = found.errors()
-        # A misspelt field is unknown and, under its right name, missing: the first says more.
-        first = next((item for item in errors if item["type"] == "extra_forbidden"), errors[0])
-        raise error(f"{place}: {_reason(first, model)}") from found
+        raise error(f"{place}: {_first_reason(found, model)}") from found
+
+
+def validated_value[Model: BaseModel](model: type[Model], value: Mapping[str, Any], place: str) -> Model:
+    """Make a model of what was read already, such as a row of a table.
+
+    Raises:
+        DatasetError: It is not what the model expects.
+    """
+    try:
+        return model.model_validate(value)
+    except ValidationError as found:
+        raise DatasetError(f"{place}: {_first_reason(found, model)}") from found
+
+
+def _first_reason(found: ValidationError, model: type[BaseModel]) -> str:
+    errors = found.errors()
+    # A misspelt field is unknown and, under its right name, missing: the first says more.
+    return _reason(next((item for item in errors if item["type"] == "extra_forbidden"), errors[0]), model)
 
 
 def _reason(error: Mapping[str, Any], model: type[BaseModel]) -> str:
