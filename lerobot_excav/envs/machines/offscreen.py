@@ -100,7 +100,7 @@ def _require_this_process() -> None:
 
 def _leave_display() -> None:
     """Keep a forked process from closing the display that it inherited, be it at its end: that hangs."""
-    egl = sys.modules.get("mujoco.egl")
+    egl: Any = sys.modules.get("mujoco.egl")
     if egl is not None:
         atexit.unregister(egl.EGL.eglTerminate)  # as older versions of MuJoCo do it; newer ones look for the display
         egl.EGL_DISPLAY = None
