@@ -50,9 +50,9 @@ def unbind(backend: str) -> None:
 
         osmesa.osmesa.OSMesaMakeCurrent(None, None, osmesa.GL.GL_FLOAT, 0, 0)
     elif sys.platform != "darwin":  # there MuJoCo's context is not GLFW's
-        import glfw
+        from mujoco import glfw
 
-        glfw.make_context_current(None)
+        glfw.glfw.make_context_current(None)
 
 
 def _egl(width: int, height: int) -> Any:
