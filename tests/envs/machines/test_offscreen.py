@@ -36,7 +36,7 @@ def run(code, **variables):
     names = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY", "PYOPENGL_PLATFORM")
     environment = {key: value for key, value in os.environ.items() if key not in names} | variables
     command = [sys.executable, "-c", START + code]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
     return done.stdout + done.stderr.strip().rpartition("\n")[2] * (done.returncode != 0)
 
 
