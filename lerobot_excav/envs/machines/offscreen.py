@@ -13,6 +13,7 @@ from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.errors import RenderingError
 
 _opening = threading.Lock()
+_inherited: list["OffscreenContext"] = []
 _used_by: int | None = None
 """The process that opened a context first; OpenGL does not survive a fork, not even for contexts made after it."""
 
@@ -64,7 +65,8 @@ class OffscreenContext:
     def free(self) -> None:
         """Free it; it cannot be used afterwards."""
         if _used_by != os.getpid():
-            return  # freeing what a fork inherited hangs
+            _inherited.append(self)  # to free it hangs, also by the garbage collector
+            return
         with self.bound():
             self._mjr.free()
         self._context.free()
