@@ -6,8 +6,16 @@ VENV := .venv
 UV := $(VENV)/bin/uv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
+LOWEST := $(VENV)/lowest
+NEWEST := $(VENV)/newest
 DEMO := outputs/demo
 JOBS ?= 1
+# The newest Python that pyproject.toml names; pyenv gives a version only when asked for it.
+PYTHON_NEWEST ?= $(shell PYENV_VERSION=3.13 python3.13 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3.13)
+# What differs between versions of what we depend on: simulators, pictures, the interfaces of LeRobot and Gymnasium.
+LOWEST_TESTS ?= tests/contract tests/envs/machines tests/envs/tasks tests/envs/configs
+PYTEST := -m pytest -n 2 --dist=worksteal
+TOOLS := build hatchling hypothesis pytest pytest-xdist snakemake
 
 # No GPU and no display are needed: pictures come from EGL. LeRobot asks no hub for anything.
 export MUJOCO_GL ?= egl
@@ -15,7 +23,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-fr5 table-manipulation test fuzz lint type docs wheel clean
+.PHONY: help setup demo demo-fr5 table-manipulation test test-lowest test-long fuzz lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -47,7 +55,29 @@ table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluat
 	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/fr5_grasp/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
-	@OMP_NUM_THREADS=1 $(RUN)/pytest -n 2 --dist=worksteal
+	@OMP_NUM_THREADS=1 $(RUN)/python $(PYTEST)
+
+test-lowest: $(LOWEST)/.ready ## test the simulators with the lowest versions that pyproject.toml allows (LOWEST_TESTS=tests for all)
+	@OMP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) $(LOWEST_TESTS)
+
+test-long: $(LOWEST)/.ready $(NEWEST)/.ready ## everything before an issue is called done: both ends of all versions, kills, fuzz (hours)
+	@OMP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) tests
+	@OMP_NUM_THREADS=1 $(NEWEST)/bin/python $(PYTEST) tests
+	@OMP_NUM_THREADS=1 $(RUN)/python -m pytest tests/long/test_*.py
+	@OMP_NUM_THREADS=1 $(RUN)/python -m pytest tests/fuzz --hypothesis-profile=fuzz
+
+$(LOWEST)/.ready: pyproject.toml $(READY)
+	@$(UV) venv --quiet --clear --python $(RUN)/python $(LOWEST)
+	@$(UV) pip install --quiet --python $(LOWEST)/bin/python --resolution=lowest-direct --editable .
+	@$(UV) pip install --quiet --python $(LOWEST)/bin/python $(TOOLS)
+	@touch $@
+
+$(NEWEST)/.ready: pyproject.toml $(READY)
+	@command -v $(PYTHON_NEWEST) >/dev/null || { \
+	  echo "make: Python 3.13 is not here; install it, or name it: make PYTHON_NEWEST=/path/to/python3.13 test-long"; exit 1; }
+	@$(UV) venv --quiet --clear --python $(PYTHON_NEWEST) $(NEWEST)
+	@$(UV) pip install --quiet --python $(NEWEST)/bin/python --editable . $(TOOLS)
+	@touch $@
 
 fuzz: $(READY) ## random commands to machine and soil, checked after every step (about an hour)
 	@OMP_NUM_THREADS=1 $(RUN)/pytest tests/fuzz --hypothesis-profile=fuzz

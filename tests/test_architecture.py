@@ -174,6 +174,26 @@ def test_soil_knows_nothing_of_mujoco():
         assert "import mujoco" not in path.read_text()
 
 
+def imported_names(path):
+    """Yield the first part of every absolute import of a file."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module.partition(".")[0]
+
+
+def test_nothing_is_imported_that_windows_lacks():
+    only_posix = {"crypt", "fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"}
+    assert [name_of(path) for path in MODULES if only_posix & set(imported_names(path))] == []
+
+
+def test_mujoco_is_imported_where_a_wrong_mujoco_gl_is_told():
+    # Its context classes are for whoever knows which backend works.
+    allowed = {"envs.machines.simulator", "envs.machines.opengl_backend"}
+    assert {name_of(path) for path in MODULES if "mujoco" in imported_names(path)} == allowed
+
+
 def test_importing_the_package_imports_nothing_heavy():
     code = (
         "import sys, lerobot_excav; "

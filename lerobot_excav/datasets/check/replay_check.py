@@ -4,7 +4,9 @@ import numpy as np
 
 from lerobot_excav.datasets.complete.resimulation import STATE_TOLERANCE, state_deviation
 from lerobot_excav.datasets.format.episode_table import EpisodeTable
+from lerobot_excav.datasets.record.provenance import PROVENANCE_PATH
 from lerobot_excav.datasets.record.simulation import play_again
+from lerobot_excav.envs.configs.provenance import package_versions
 
 
 def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
@@ -13,7 +15,10 @@ def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
     played = play_again(spec, recorded.action, recorded.pair, recorded.schedule, fps=fps, columns=recorded.settings)
     largest, frame = state_deviation(played, recorded)
     if largest > STATE_TOLERANCE:
-        return f"replay leaves the recorded state at frame {frame} (up to {largest:.3g} rad)"
+        return (
+            f"replay leaves the recorded state at frame {frame} (up to {largest:.3g} rad) with MuJoCo "
+            f"{package_versions()['mujoco']}; another version may differ, see packages in {PROVENANCE_PATH}"
+        )
     task = np.abs(played.task_state - recorded.task_state)
     if task.max() > spec.task_state_tolerance:
         name = spec.task_state_names[int(np.argmax(task.max(axis=0)))]

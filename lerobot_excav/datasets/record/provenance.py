@@ -6,12 +6,12 @@ needs it, and failed episodes are listed nowhere else.
 
 import json
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.envs.configs.provenance import package_versions
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import write_whole
 
@@ -34,7 +34,7 @@ class Provenance:
 def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list[dict[str, Any]]) -> None:
     """Write how a dataset was made."""
     record = {
-        "package": f"lerobot_env_excav {version('lerobot_env_excav')}",
+        "packages": package_versions(),
         "operator": "scripted",
         "settings": settings.as_record(),
         "episodes": [

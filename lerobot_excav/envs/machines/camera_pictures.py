@@ -1,25 +1,27 @@
 """Pictures that the fixed cameras of a MuJoCo model take off screen: colour, distance, and what each pixel shows."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.offscreen import create_context
+from lerobot_excav.envs.machines.offscreen import OffscreenContext
 from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.errors import RenderingError, require, require_choice
 
 
 class CameraPictures:
     """Draws a model without shadows and reflections.
 
-    All pictures share one graphics context, made with the first of them, in the process that asks for it.
+    All pictures share one graphics context, made with the first of them, in the process that asks for it. Threads may
+    draw one after the other.
 
     Every method that draws takes the name of a `camera` and drawing `options` (an `MjvOption`), and raises
-    `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics context can be made or the
-    pictures were closed.
+    `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics context can be made or used, or
+    the pictures were closed.
 
     Args:
         model: The model.
@@ -45,8 +47,7 @@ class CameraPictures:
         self._cameras = tuple(cameras)
         self._height, self._width = height, width
         self._max_geoms = max_geoms
-        self._context: Any = None
-        self._mjr: Any = None
+        self._context: OffscreenContext | None = None
         self._scene: Any = None
         self._closed = False
         self._camera = mujoco.MjvCamera()
@@ -54,14 +55,14 @@ class CameraPictures:
 
     def colour(self, camera: str, options: Any) -> NDArray[np.uint8]:
         """Return a colour picture (H, W, 3), uint8."""
-        self._draw(camera, options)
-        return self._read_colour()
+        with self._drawn(camera, options) as mjr:
+            return self._read_colour(mjr)
 
     def distance_m(self, camera: str, options: Any) -> NDArray[np.float64]:
         """Return the distance along the optical axis (H, W) [m]; the far plane where nothing is."""
-        self._draw(camera, options)
         buffer = np.empty((self._height, self._width), np.float32)
-        mujoco.mjr_readPixels(None, buffer, self._viewport, self._mjr)
+        with self._drawn(camera, options) as mjr:
+            mujoco.mjr_readPixels(None, buffer, self._viewport, mjr)
         visual = self._model.vis.map
         near, far = (d * self._model.stat.extent for d in (visual.znear, visual.zfar))
         # The buffer holds 1 at the near plane and 0 at the far one, hyperbolic in between.
@@ -85,16 +86,8 @@ class CameraPictures:
 
     def geoms(self, camera: str, options: Any) -> NDArray[np.int64]:
         """Return the index in the model of the geom that every pixel shows (H, W); -1 where none is."""
-        self._open()
-        flags = (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR)
-        for flag in flags:
-            self._scene.flags[flag] = True
-        try:
-            self._draw(camera, options)
-            picture = self._read_colour()
-        finally:
-            for flag in flags:
-                self._scene.flags[flag] = False
+        with self._drawn(camera, options, numbers=True) as mjr:
+            picture = self._read_colour(mjr)
         # Colour n + 1 is the n-th drawn object, 0 the background.
         number = picture @ np.array([1, 1 << 8, 1 << 16]) - 1
         shown = np.full((self._height, self._width), -1)
@@ -107,43 +100,40 @@ class CameraPictures:
         """Free the graphics context; no picture can be taken afterwards."""
         self._closed = True
         if self._context is not None:
-            self._context.make_current()
-            self._mjr.free()
             self._context.free()
-            self._context = self._mjr = self._scene = None
+            self._context = self._scene = None
 
     @property
     def _viewport(self) -> Any:
         return mujoco.MjrRect(0, 0, self._width, self._height)
 
-    def _open(self) -> None:
+    def _opened(self) -> OffscreenContext:
         if self._closed:
             raise RenderingError("the renderer was closed; make a new one for more pictures")
-        if self._context is not None:
-            return
-        model = self._model
-        model.vis.global_.offwidth, model.vis.global_.offheight = self._width, self._height
-        self._context = create_context(self._width, self._height)
-        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
-        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
-        self._scene = mujoco.MjvScene(model, maxgeom=self._max_geoms)
-        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self._scene.flags[flag] = False
+        if self._context is None:
+            self._context = OffscreenContext(self._model, width=self._width, height=self._height)
+            self._scene = mujoco.MjvScene(self._model, maxgeom=self._max_geoms)
+            for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+                self._scene.flags[flag] = False
+        return self._context
 
-    def _draw(self, camera: str, options: Any) -> None:
+    @contextmanager
+    def _drawn(self, camera: str, options: Any, *, numbers: bool = False) -> Iterator[Any]:
+        """Draw things in their colours or as their numbers; give the `MjrContext` that holds the picture."""
         require_choice("camera", camera, self._cameras)
-        self._open()
-        self._context.make_current()
-        self._camera.fixedcamid = self._model.camera(camera).id
-        mujoco.mjv_updateScene(
-            self._model, self._data, options, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
-        )
-        mujoco.mjr_render(self._viewport, self._scene, self._mjr)
+        with self._opened().bound() as mjr:
+            self._camera.fixedcamid = self._model.camera(camera).id
+            for flag in (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR):
+                self._scene.flags[flag] = numbers
+            mujoco.mjv_updateScene(
+                self._model, self._data, options, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
+            )
+            mujoco.mjr_render(self._viewport, self._scene, mjr)
+            yield mjr
 
-    def _read_colour(self) -> NDArray[np.uint8]:
+    def _read_colour(self, mjr: Any) -> NDArray[np.uint8]:
         image = np.empty((self._height, self._width, 3), np.uint8)
-        mujoco.mjr_readPixels(image, None, self._viewport, self._mjr)
+        mujoco.mjr_readPixels(image, None, self._viewport, mjr)
         return image[::-1].copy()
 
 

@@ -33,12 +33,13 @@ def _imports(source: str) -> list[str]:
 
 
 def _cache_directory() -> Path:
-    """Return a directory for compiled code that belongs to exactly these kernels.
+    """Return a directory for compiled code that belongs to exactly these kernels and this version of numba.
 
     Numba looks at the file of a kernel alone: after a change in another file, of a kernel that it calls or of a
-    constant, it would go on with the old code.
+    constant, it would go on with the old code. Another version of numba throws the code away, so that two environments
+    with one checkout would compile at every start.
     """
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(numba.__version__.encode())
     for source in _kernel_sources():
         digest.update(source.encode())
     name = f"kernels-{digest.hexdigest()[:16]}"

@@ -80,6 +80,13 @@ def test_compiled_code_is_kept_beside_the_sources_under_their_digest(package, mo
     assert compiled._cache_directory() != first
 
 
+def test_two_versions_of_numba_do_not_share_a_directory(package, monkeypatch):
+    # Each would throw the code of the other away and compile at every start.
+    first = compiled._cache_directory()
+    monkeypatch.setattr(compiled.numba, "__version__", "0.0.0")
+    assert compiled._cache_directory() != first
+
+
 def test_the_shared_constants_belong_to_the_kernels():
     assert any("GRAVITY_M_S2 = " in source for source in compiled._kernel_sources())
 

@@ -3,10 +3,10 @@
 from itertools import pairwise
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX

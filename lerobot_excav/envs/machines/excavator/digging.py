@@ -1,11 +1,11 @@
 """Digging resistance on the joints: the patches of the soil, solved again in every substep."""
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.braking import braking_impulse, patch_rows, solved
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.envs.soil.tool import Reaction
 

@@ -4,11 +4,11 @@ A software renderer spends its time per geom, hardly per triangle: with llvmpipe
 and skins of a thousand parcels 2 ms.
 """
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
+from lerobot_excav.envs.machines.simulator import mujoco
 
 PARCELS_PER_SKIN = 250
 MOST_PARCELS = 4000

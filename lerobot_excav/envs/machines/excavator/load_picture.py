@@ -4,13 +4,13 @@ Hundreds of drawn parcels would look like a load of balls. The skin turns them i
 it are drawn besides.
 """
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator import surfaces
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
 
 LOAD_SKIN = "load"

@@ -1,6 +1,5 @@
 """The excavator as a physical machine: commands and soil reactions in, joint motion out."""
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,7 @@ from lerobot_excav.envs.machines.excavator.digging import JointResistance
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.tool import Reaction, Tool
 from lerobot_excav.errors import ConfigurationError, ExcavError

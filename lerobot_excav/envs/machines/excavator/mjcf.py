@@ -1,6 +1,5 @@
 """The MuJoCo model of machine, ground and target box, assembled from primitive geoms."""
 
-import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.camera_pictures import add_camera
@@ -10,6 +9,7 @@ from lerobot_excav.envs.machines.excavator.bodywork import COLLISION_GROUP, STAN
 from lerobot_excav.envs.machines.excavator.grains import add_grains
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.load_picture import add_load
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.container import Container
 
 _GROUND_DROP_M = 0.02

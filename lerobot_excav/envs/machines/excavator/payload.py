@@ -1,10 +1,10 @@
 """The soil in the bucket as a rigid body: mass, centre of mass and inertia written into the model."""
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.compiled import kernel
 
 Array = NDArray[np.float64]

@@ -2,7 +2,6 @@
 
 from functools import cache
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +10,7 @@ from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.grains import Grains
 from lerobot_excav.envs.machines.excavator.load_picture import LoadPicture
 from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil import Soil
 
 _HIDDEN_M = -0.03

@@ -5,12 +5,12 @@ milliseconds on a CPU. The vertices of a skin are streamed to the renderer with 
 them costs nothing extra; normals are recomputed, so that slopes show.
 """
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.bodywork import SURROUNDINGS_GROUP
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.container import Container
 
 TERRAIN_SKIN = "terrain"

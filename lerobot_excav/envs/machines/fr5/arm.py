@@ -1,10 +1,10 @@
 """The arm, built of primitive geoms."""
 
-import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.geoms import ARM, DECORATION
+from lerobot_excav.envs.machines.simulator import mujoco
 
 _SHELL_RGBA = (0.92, 0.93, 0.94, 1.0)
 _JOINT_RGBA = (0.30, 0.33, 0.38, 1.0)

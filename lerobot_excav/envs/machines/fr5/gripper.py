@@ -1,9 +1,8 @@
 """The two-finger gripper: mirrored slides in place of the adaptive linkage, driven by one motor."""
 
-import mujoco
-
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.geoms import ARM, HARD_SOLREF
+from lerobot_excav.envs.machines.simulator import mujoco
 
 _HAND_RGBA = (0.16, 0.17, 0.19, 1.0)
 _PAD_RGBA = (0.05, 0.05, 0.06, 1.0)
@@ -45,7 +44,9 @@ def _add_finger(hand: mujoco.MjsBody, finger: int, side: float) -> None:
 def _couple_fingers(spec: mujoco.MjSpec) -> None:
     wide, narrow = const.FINGER_NAMES
     tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=narrow, name2=wide, solref=HARD_SOLREF)
-    tie.objtype, tie.data = mujoco.mjtObj.mjOBJ_JOINT, [0.0, 1.0, *[0.0] * 10]
+    tie.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    tie.data[:] = 0.0  # in place: how many numbers an equality has depends on MuJoCo's version
+    tie.data[1] = 1.0
 
 
 def _add_motor(spec: mujoco.MjSpec) -> None:

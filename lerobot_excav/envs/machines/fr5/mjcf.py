@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from lerobot_excav.envs.machines.camera_pictures import add_camera
@@ -11,6 +10,7 @@ from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.arm import add_arm
 from lerobot_excav.envs.machines.fr5.geoms import BLOCK, CELL, HARD_SOLREF
 from lerobot_excav.envs.machines.fr5.gripper import add_gripper
+from lerobot_excav.envs.machines.simulator import mujoco
 
 _TRAY_RGBA = (0.35, 0.37, 0.40, 1.0)
 _RIM_PIECES = 16

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,7 @@ from lerobot_excav.envs.machines.fr5 import layout
 from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW
 from lerobot_excav.envs.machines.fr5.geoms import ARM
 from lerobot_excav.envs.machines.fr5.mjcf import build_model
+from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.errors import ConfigurationError, ExcavError
 
 ACTION_SIZE = len(ACTION_LOW)  # six joint position targets [rad], gripper target [0..1]

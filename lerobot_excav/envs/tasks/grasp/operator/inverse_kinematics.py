@@ -1,13 +1,13 @@
 """Joint positions that put the gripper where it is wanted, by differential inverse kinematics (mink)."""
 
 import mink
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.arm import add_arm
 from lerobot_excav.envs.machines.fr5.layout import BASE_POS_W
+from lerobot_excav.envs.machines.simulator import mujoco
 
 # Weights of the error in position [1/m] and direction [1/rad], and of the distance from the home pose (kind: tuned:
 # the first two decide, the last chooses among what they leave).
