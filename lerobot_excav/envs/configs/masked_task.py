@@ -116,10 +116,12 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
 
     def _require_one_recorded_batch(self, n_envs: int) -> None:
         """Raise where LeRobot 0.6.1 would end in a FileExistsError after the first batch."""
-        wanted = getattr(holder_of(self, "env"), "eval", None)
+        evaluation: Any = getattr(holder_of(self, "env"), "eval", None)
+        if evaluation is None or not getattr(evaluation, "recording", False):
+            return
         require(
-            not getattr(wanted, "recording", False) or wanted.n_episodes <= n_envs,
-            f"--eval.recording=true records one batch only, and --eval.n_episodes={getattr(wanted, 'n_episodes', 0)} "
+            evaluation.n_episodes <= n_envs,
+            f"--eval.recording=true records one batch only, and --eval.n_episodes={evaluation.n_episodes} "
             f"needs several of {n_envs}. Leave it out, or give --eval.batch_size the number of episodes. "
             "`lerobot-rollout --strategy.type=episodic` records what a policy does in a way that can be trained on.",
         )
