@@ -9,7 +9,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict
 
-from lerobot_excav.datasets.format.validated import validated
+from lerobot_excav.datasets.format.validated import validated_file
 from lerobot_excav.evaluation.training import TrainingFacts, read_training
 
 
@@ -37,7 +37,7 @@ class EvaluationOrigin(BaseModel):
         path = metrics.with_suffix(".json")
         if not path.is_file():
             return cls(command=None)
-        origin = validated(cls, path.read_text(encoding="utf-8"), str(path))
+        origin = validated_file(cls, path)
         if origin.training is None and origin.policy is not None:
             return origin.model_copy(update={"training": read_training(Path(origin.policy))})
         return origin

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict
 
-from lerobot_excav.datasets.format.validated import validated
+from lerobot_excav.datasets.format.validated import validated_file
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import write_whole
 
@@ -40,7 +40,7 @@ class ReportFolder:
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / LIST
-        self._files = validated(_Listed, path.read_text(encoding="utf-8"), str(path)).files if path.exists() else {}
+        self._files = validated_file(_Listed, path).files if path.exists() else {}
         for name in self._files:
             if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
                 raise DatasetError(f"{path}: {name!r} lies outside of the folder; remove {path}")

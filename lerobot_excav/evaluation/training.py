@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from lerobot_excav.datasets.format.validated import validated
+from lerobot_excav.datasets.format.validated import validated_file
 from lerobot_excav.evaluation.training_log import read_training_log
 
 
@@ -85,7 +85,7 @@ def read_training(pretrained: Path) -> TrainingFacts | None:
 
 
 def _read[Model: BaseModel](model: type[Model], path: Path) -> Model | None:
-    return validated(model, path.read_text(encoding="utf-8"), str(path)) if path.is_file() else None
+    return validated_file(model, path) if path.is_file() else None
 
 
 def _demonstrations(dataset: _Dataset) -> int | None:

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeIn
 
 from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.format.schema import Feature
-from lerobot_excav.datasets.format.validated import validated
+from lerobot_excav.datasets.format.validated import validated_file
 from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
@@ -108,6 +108,4 @@ def read_info(root: Path) -> DatasetInfo:
     path = root / INFO_PATH
     if not path.exists():
         raise DatasetError(f"{root} is not a LeRobot dataset: it has no {INFO_PATH}")
-    with reading(path):
-        text = path.read_text(encoding="utf-8")
-    return validated(DatasetInfo, text, str(path))
+    return validated_file(DatasetInfo, path)

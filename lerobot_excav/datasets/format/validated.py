@@ -1,10 +1,12 @@
 """What is read from a file, as a model: errors say where, which field, and what is allowed."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.errors import DatasetError, ExcavError, shown
 
 
@@ -20,6 +22,17 @@ def validated[Model: BaseModel](
         return model.model_validate_json(text)
     except ValidationError as found:
         raise error(f"{place}: {_first_reason(found, model)}") from found
+
+
+def validated_file[Model: BaseModel](model: type[Model], path: Path) -> Model:
+    """Make a model of a JSON file.
+
+    Raises:
+        DatasetError: The file is missing, not text, not JSON, or not what the model expects.
+    """
+    with reading(path):
+        text = path.read_text(encoding="utf-8")
+    return validated(model, text, str(path))
 
 
 def validated_value[Model: BaseModel](model: type[Model], value: Mapping[str, Any], place: str) -> Model:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.configs.provenance import package_versions
 from lerobot_excav.errors import DatasetError
@@ -52,12 +53,11 @@ def read_provenance(root: Path) -> Provenance:
         ConfigurationError: It was made in another version of the simulation.
     """
     path = root / PROVENANCE_PATH
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         raise DatasetError(
             f"{root} has no {PROVENANCE_PATH}: it was recorded, merged or edited, not made by `lerobot-excav demos`"
-        ) from None
-    return Provenance(
-        settings=DemonstrationSettings.from_record(record["settings"], source=path), outcomes=record["episodes"]
-    )
+        )
+    with reading(path):
+        record = json.loads(path.read_text(encoding="utf-8"))
+        settings, outcomes = dict(record["settings"]), record["episodes"]
+    return Provenance(settings=DemonstrationSettings.from_record(settings, source=path), outcomes=outcomes)

@@ -11,8 +11,10 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.tasks.measures import EpisodeRecord
+from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
@@ -44,6 +46,7 @@ def grid_clips(page: ResultPage) -> list[list[Clip]]:
     """Return the clips of a page whose videos are there, row by row.
 
     Raises:
+        DatasetError: A video is damaged, or of an episode that was not played.
         RenderingError: Pictures cannot be made on this machine.
     """
     rows = {row.row.label: row for row in page.rows}
@@ -71,15 +74,25 @@ def _video(row: PageRow, number: int) -> Path:
 
 def _clip(row: PageRow, number: int) -> Clip:
     # In the order in which they were played, as the videos are numbered.
-    key, episode = list(row.run.first.episodes.items())[number]
+    played = list(row.run.first.episodes.items())
+    if number >= len(played):
+        raise DatasetError(
+            f"clips of {row.row.label!r}: episode {number} was not played; {row.run.first.path} has episodes 0 to "
+            f"{len(played) - 1}"
+        )
+    key, episode = played[number]
     height, width = next(read_video(_video(row, number))).shape[:2]
     masks = shown_masks(row.run, key, height=height, width=width)
     return Clip(path=_video(row, number), masks=masks, episode=episode)
 
 
 def read_video(path: Path) -> Iterator[Image]:
-    """Yield the pictures of a video, uint8 (H, W, 3)."""
-    with av.open(str(path)) as container:
+    """Yield the pictures of a video, uint8 (H, W, 3).
+
+    Raises:
+        DatasetError: The file is damaged.
+    """
+    with reading(path), av.open(str(path)) as container:
         for frame in container.decode(video=0):
             yield frame.to_ndarray(format="rgb24")
 
