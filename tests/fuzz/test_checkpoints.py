@@ -16,7 +16,7 @@ from lerobot_excav.policies.mask_act import export
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
 from lerobot_excav.policies.mask_act.processor_mask_act import make_mask_act_pre_post_processors
 
-from ..policies.mask_act.conftest import STATE, make_policy
+from ..policies.mask_act.conftest import CAB, MAIN, STATE, make_policy
 from .mutation import (
     GARBAGE,
     Outcome,
@@ -47,7 +47,7 @@ WRONG_SETTINGS = {
     "temporal_ensemble_coeff": [-1.0, float("nan"), float("inf")],
     "vision_backbone": ["vgg16", "", 3],
     "backbone_norm": ["layer", 1],
-    "preset": ["slow", None],
+    "preset": ["slow", 3],
     "input_features": [{}, None, 3, {"observation.state": {"type": "STATE", "shape": [8]}}],
     "output_features": [None, 3, {}],
     "mask_key": ["observation.images.nowhere"],
@@ -69,8 +69,8 @@ def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("trained") / "pretrained_model"
     policy = make_policy(target_token=True)
     policy.save_pretrained(folder)
-    stats = {STATE: {"mean": torch.full((8,), 2.0), "std": torch.full((8,), 4.0)}}
-    stats["action"] = {"mean": torch.zeros(4), "std": torch.ones(4)}
+    sizes = {STATE: (8,), "action": (4,), **dict.fromkeys((MAIN, CAB), (3, 1, 1))}
+    stats = {key: {"mean": torch.zeros(size), "std": torch.ones(size)} for key, size in sizes.items()}
     for pipeline in make_mask_act_pre_post_processors(policy.config, stats):
         pipeline.save_pretrained(folder)
     return folder
@@ -206,7 +206,7 @@ def test_a_policy_with_other_weights_than_its_own_does_not_play(tmp_path_factory
 
 
 def test_an_export_that_believes_everything_is_found_out(tmp_path, trained, monkeypatch):
-    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts: (out / "model").write_bytes(b""))
+    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts: out.mkdir())
     change = harmful("no weights", weights_change(lambda weights: weights.clear()))
     with pytest.raises(AssertionError, match="accepted in silence"):
         judge(change, trained, tmp_path)

@@ -206,10 +206,11 @@ def test_a_changed_page_is_refused_in_words_or_made(tmp_path_factory, change):
 
 def test_a_page_that_removes_files_of_others_is_found_out(tmp_path, monkeypatch):
     keep = page_files._keep_metrics
-    monkeypatch.setattr(
-        page_files,
-        "_keep_metrics",
-        lambda page, folder: (keep(page, folder), (folder / "mine.jsonl").unlink(missing_ok=True)),
-    )
+
+    def keep_and_remove(page, stage, folder):
+        (folder / "mine.jsonl").unlink(missing_ok=True)
+        return keep(page, stage, folder)
+
+    monkeypatch.setattr(page_files, "_keep_metrics", keep_and_remove)
     with pytest.raises(AssertionError, match=r"lost or changed: .*mine\.jsonl"):
         judge(harmless("nothing", lambda folder: None), tmp_path)
