@@ -275,7 +275,8 @@ COMMAND_TABLES = {
     "qc": {"dataset": optional(path), "episodes": optional(each(whole(0))), "replays": whole(0), "seed": whole(0)},
     "index": {
         **dict.fromkeys(("dataset", "session", "out"), optional(path)),
-        **dict.fromkeys(("skip_restarted", "include_failures", "flags"), flag),
+        **dict.fromkeys(("skip_restarted", "recover", "include_failures", "flags"), flag),
+        "task": optional(text),
         "select": one_of("all", "paired", "non-paired", "balanced"),
         **dict.fromkeys(("episodes", "scenes"), optional(whole(1))),
         "split": optional(one_of("scene", "episode")),

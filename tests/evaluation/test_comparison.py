@@ -7,7 +7,8 @@ from lerobot_excav.evaluation.comparison import compare, matched
 def test_differences_are_paired_by_scene_and_target(make_run, scoop_line, rng):
     first = make_run("a", [scoop_line(i, target_success=i < 2, retained_mass_kg=100.0 * i) for i in range(8)])
     # The same scenes in another order, each 7 kg better.
-    second = make_run("b", [scoop_line(i, episode_ix=9, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))])
+    better = [scoop_line(i, episode_ix=7 - i, retained_mass_kg=100.0 * i + 7) for i in reversed(range(8))]
+    second = make_run("b", better)
     target, full, mass = compare(first, second, rng)
     assert target.difference.estimate == pytest.approx(0.75)
     assert target.p_value == pytest.approx(2 / 2**6)
@@ -31,6 +32,7 @@ def test_runs_on_other_scenes_are_not_compared(make_run, scoop_line, rng):
 
 def test_the_operator_may_have_played_more_scenes_but_not_fewer(make_run, scoop_line):
     operator = make_run("o", [scoop_line(i, retained_mass_kg=float(i)) for i in range(1, 5)])
-    assert matched(make_run("a", [scoop_line(3), scoop_line(2)]), operator, "retained_mass_kg").tolist() == [2.0, 3.0]
+    policy = make_run("a", [scoop_line(3), scoop_line(2, episode_ix=4)])
+    assert matched(policy, operator, "retained_mass_kg").tolist() == [2.0, 3.0]
     with pytest.raises(DatasetError, match="lacks 1 scenes"):
         matched(make_run("b", [scoop_line(9)]), operator, "retained_mass_kg")

@@ -84,7 +84,7 @@ def _arrays(found: dict[str, Any] | None, shape: tuple[int, ...]) -> dict[str, N
 
 
 def _require_possible(found: dict[str, NDArray[np.float64]]) -> None:
-    slack = TOLERANCE * (found["max"] - found["min"])
+    slack = TOLERANCE * (found["max"] - found["min"]) + LEAST_TOLERANCE
     if (found["min"] > found["max"]).any():
         raise DatasetError("has a min above its max")
     if (found["mean"] < found["min"] - slack).any() or (found["mean"] > found["max"] + slack).any():

@@ -10,7 +10,7 @@ import shutil
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,12 +103,18 @@ def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: boo
 def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
     pairs = settings.pairs()
-    with worker_pool(workers) as pool, EpisodeProgress(len(pairs), show=show_progress) as progress:
+    with (
+        worker_pool(workers) as pool,
+        EpisodeProgress(len(pairs), show=show_progress) as progress,
+        ExitStack() as stack,
+    ):
         futures = {pair: _start(pool, progress, settings, pair, partial.episodes) for pair in pairs}
         # LeRobot takes seconds to load; by now the workers are at work.
         from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
 
         dataset = create_dataset(partial.dataset, settings)
+        # Else its threads go on writing into a folder that is given up.
+        stack.callback(dataset.writer.stop_image_writer)
         outcomes = []
         for pair, future in futures.items():
             outcome = episode_result(pair, future)
