@@ -56,11 +56,12 @@ def test_without_a_camera_of_the_task_it_is_another_dataset(edit):
     assert any(MAIN in problem for problem in check_dataset(root, replays=0).problems)
 
 
-def test_pictures_become_videos_with_lossless_settings_only(edit):
+def test_pictures_that_lerobot_turned_into_videos_lack_what_training_needs_and_qc_says_so(edit):
     root = edit("convert_image_to_video", *[f"rgb_encoder.{each}" for each in LOSSLESS], "num_workers=1")
     assert read_info(root).features[MAIN]["dtype"] == "video"
-    assert_passes(root, 8)
-
+    problems = " ".join(check_dataset(root, replays=0).problems)
+    assert f"{MAIN} lacks min" in problems  # lerobot-train ends in a KeyError
+    assert "lacks tasks" in problems
 
 def test_lerobots_own_settings_for_videos_are_refused_afterwards(edit):
     report = check_dataset(edit("convert_image_to_video", "num_workers=1"), replays=0)
