@@ -1,7 +1,7 @@
 import pytest
 import toy_reach.env
 
-from .toy import command_next_spot, record_toy
+from .toy import command_next_spot, record_small, record_toy
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -42,10 +42,7 @@ def changing_datasets(tmp_path_factory):
 @pytest.fixture(scope="session")
 def small_datasets(tmp_path_factory):
     """Two scenes with two targets, by storage. Not to be changed by tests."""
-    folder = tmp_path_factory.mktemp("small")
-    for storage in ("image", "video"):
-        record_toy(folder / storage, scenes=2, targets=2, storage=storage)
-    return {storage: folder / storage for storage in ("image", "video")}
+    return record_small(tmp_path_factory.mktemp("small"))
 
 
 @pytest.fixture

@@ -63,6 +63,7 @@ def test_pictures_that_lerobot_turned_into_videos_lack_what_training_needs_and_q
     assert f"{MAIN} lacks min" in problems  # lerobot-train ends in a KeyError
     assert "lacks tasks" in problems
 
+
 def test_lerobots_own_settings_for_videos_are_refused_afterwards(edit):
     report = check_dataset(edit("convert_image_to_video", "num_workers=1"), replays=0)
     assert any("blurs the mask" in problem for problem in report.problems)

@@ -6,6 +6,7 @@ from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
 from lerobot_excav.datasets.format.schema import ACTION_KEY, PAIR_KEY, SCENE_KEY, STATE_KEY, TARGET_KEY
+from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.robots.session_log import SessionLog
@@ -25,6 +26,13 @@ def toy_settings(env=None, **settings):
 def record_toy(out, *, resume=False, **settings):
     """Record a dataset in this process."""
     return record_demonstrations(toy_settings(**settings), out, workers=0, resume=resume, show_progress=False)
+
+
+def record_small(folder):
+    """Record two scenes with two targets, by storage."""
+    for storage in STORAGES:
+        record_toy(folder / storage, scenes=2, targets=2, storage=storage)
+    return {storage: folder / storage for storage in STORAGES}
 
 
 def command_next_spot(patch):

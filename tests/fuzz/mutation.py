@@ -18,14 +18,12 @@ from hypothesis import strategies as st
 
 from lerobot_excav.scripts.main import main
 
-LONG_RUN = 1_000
 
-
-def inputs(few):
-    """Return how Hypothesis is to try inputs: a few in the suite, a thousand in `make fuzz`; never the same twice."""
+def inputs(few, many=1_000):
+    """Return how Hypothesis is to try inputs: a few in the suite, many in `make fuzz`; never the same twice."""
     is_long = settings.get_current_profile_name() == "fuzz"
     return settings(
-        max_examples=LONG_RUN if is_long else few, deadline=None, suppress_health_check=list(HealthCheck), database=None
+        max_examples=many if is_long else few, deadline=None, suppress_health_check=list(HealthCheck), database=None
     )
 
 

@@ -190,13 +190,13 @@ def judge(change, trained, folder):
     require_kept(before, digests(folder))
 
 
-@inputs(few=20)
+@inputs(few=12)
 @given(change=st.one_of(changed_weights(), changed_files(), changed_settings()))
 def test_a_changed_checkpoint_is_refused_in_words_or_exported(tmp_path_factory, trained, change):
     judge(change, trained, tmp_path_factory.mktemp("checkpoint"))
 
 
-@inputs(few=20)
+@inputs(few=8, many=300)
 @given(change=changed_weights())
 def test_a_policy_with_other_weights_than_its_own_does_not_play(tmp_path_factory, trained, change):
     folder = tmp_path_factory.mktemp("weights") / "checkpoint"

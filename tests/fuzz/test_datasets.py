@@ -13,7 +13,7 @@ from lerobot_excav.datasets.check import quality_check
 
 from ..datasets import changes
 from ..datasets.damage import HARMFUL, HARMLESS, VIDEOS
-from ..datasets.toy import MAIN, MASK, STATE, record_toy
+from ..datasets.toy import MAIN, MASK, STATE, record_small
 from .mutation import digests, harmful, harmless, inputs, require_kept, require_right, run
 
 CAMERAS = (MAIN, MASK, "observation.images.near")
@@ -28,10 +28,7 @@ DERIVED = ("meta/excav_pairs.parquet",)
 @pytest.fixture(scope="session")
 def stored(tmp_path_factory):
     """Two scenes with two targets, by storage. Not to be changed by tests."""
-    folder = tmp_path_factory.mktemp("stored")
-    for storage in ("image", "video"):
-        record_toy(folder / storage, scenes=2, targets=2, storage=storage)
-    return {storage: folder / storage for storage in ("image", "video")}
+    return record_small(tmp_path_factory.mktemp("stored"))
 
 
 def in_frame(number, change):
@@ -170,7 +167,7 @@ def test_a_changed_dataset_is_judged_in_words(tmp_path_factory, stored, change):
         judge(change, stored["image"], tmp_path_factory.mktemp("d"), patch)
 
 
-@inputs(few=3)
+@inputs(few=3, many=100)
 @given(change=named(VIDEOS, harmful))
 def test_a_changed_dataset_with_videos_is_judged_in_words(tmp_path_factory, stored, change):
     with pytest.MonkeyPatch.context() as patch:

@@ -198,7 +198,7 @@ def judge(change, folder):
         require_kept(before, digests(folder))
 
 
-@inputs(few=25)
+@inputs(few=12)
 @given(change=st.one_of(changed_rows(), changed_origins(), changed_videos()))
 def test_a_changed_page_is_refused_in_words_or_made(tmp_path_factory, change):
     judge(change, tmp_path_factory.mktemp("page"))

@@ -120,7 +120,7 @@ def judge(change, recorded, folder, option):
     assert outcome.code == 0 or not (folder / "out").exists(), "left half of a dataset"
 
 
-@inputs(few=15)
+@inputs(few=10)
 @given(data=st.data(), option=st.sampled_from([[], ["--recover"]]))
 def test_a_changed_session_log_is_refused_in_words_or_used(tmp_path_factory, recorded, data, option):
     change = data.draw(st.one_of(changed_events(recorded[1]), changed_lines(recorded[1])))
