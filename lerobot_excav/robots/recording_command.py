@@ -53,6 +53,11 @@ def require_fitting_command(robot_config: Any) -> None:
         )
 
 
+def recorded_text(robot_config: Any) -> str | None:
+    """Return the task text that the command gives every frame that it records, or None if it records nothing."""
+    return getattr(recorded_dataset(holder_of(robot_config, "robot")), "single_task", None)
+
+
 def recorded_dataset(command: Any) -> Any | None:
     """Return how the command records, or None if it does not."""
     dataset = getattr(command, "dataset", None)

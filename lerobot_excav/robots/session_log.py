@@ -4,7 +4,8 @@
 nobody can read. The log holds what a deterministic simulation needs to repeat every episode, so that `lerobot-excav
 index` can complete a recording, or recover one from a crash. It is JSON Lines, one event a line:
 
-    {"event": "session", "simulation_version": 2, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...}}
+    {"event": "session", "simulation_version": 2, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...},
+     "task": "Dig where the mask points."}
     {"event": "episode", "episode_index": 3, "scene_id": 0, "target_id": 3}
     {"event": "action", "state": [...], "action": [...]}
     {"event": "command", "target_id": 1}
@@ -14,7 +15,8 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
     {"event": "discarded"}
     {"event": "stopped"}
 
-- `session`: a robot that connected has begun to record; what the simulation is set to.
+- `session`: a robot that connected has begun to record; what the simulation is set to, and the task text of the
+  command, null if nobody knows it.
 - `episode`: an episode begins. `episode_index` is its number in the dataset; what an earlier line says of this number
   and of higher ones was not kept.
 - `action`: a frame, as LeRobot records it: the state that was observed, and the action that was carried out next, both
@@ -50,7 +52,7 @@ class SessionLog:
         DeviceError: From every method: the file cannot be written.
     """
 
-    def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings) -> None:
+    def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings, text: str | None = None) -> None:
         self.path = path
         self._journal = Journal(path, mark='"event": "session"')
         self._session: dict[str, Any] = {
@@ -58,6 +60,7 @@ class SessionLog:
             "simulation_version": spec.simulation_version,
             "env": spec.env_type,
             "settings": settings.as_dict(),
+            "task": text,
         }
         self._is_begun = False  # whether this session's first line is written
         self._is_running = False  # whether an episode is

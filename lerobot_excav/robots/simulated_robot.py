@@ -26,7 +26,7 @@ from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
-from lerobot_excav.robots.recording_command import require_fitting_command
+from lerobot_excav.robots.recording_command import recorded_text, require_fitting_command
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import SessionLog, default_path
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_pressed
@@ -64,7 +64,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._is_homing = False
         self._held_frames = 0
         log_path = config.session_log or default_path(f"{self.name}_sessions", datetime.now())
-        self._log = SessionLog(log_path, spec, self.settings)
+        self._log = SessionLog(log_path, spec, self.settings, recorded_text(config))
         self._order = self._make_order()
         self._phases = RecordingPhases(
             on_episode=self._begin_episode,

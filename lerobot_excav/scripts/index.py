@@ -47,7 +47,7 @@ class IndexArguments(DatasetArguments):
         default=False,
     )
     task: str | None = setting(
-        "With --recover: task text where none can be read; left out: the description of the task", default=None
+        "With --recover: task text where none can be read; left out: that of the session log", default=None
     )
     select: str = setting("Composition of the episodes to train on", default="all", choices=COMPOSITIONS)
     episodes: int | None = setting("How many episodes; left out: as many as there are", default=None, low=1)

@@ -193,7 +193,7 @@ def kill_and_recover(server, folder, seed, robot_type):
     kills, before = [], 0
     for resume in [False, True][: 1 + (draw.random() < 0.3)]:
         announced, was_running, moment = kill_recording(server, folder, robot_type, draw, resume=resume)
-        code = run("index", folder / "data", f"--session={folder / 'session.jsonl'}", "--recover", "--task=go")
+        code = run("index", folder / "data", f"--session={folder / 'session.jsonl'}", "--recover")
         recovered = assert_equal_to_log(folder) if code == 0 else None
         kills.append(
             Kill(

@@ -56,8 +56,8 @@ def recover_recording(root: Path, session_path: Path, *, out: Path | None = None
         root: The damaged dataset. Nothing in it is lost: its files are moved to a folder beside it.
         session_path: Session log of the simulated robot, with all sessions of the recording.
         out: Where to put the new dataset; by default it takes the place of the damaged one.
-        task: Task text of episodes whose own cannot be read; by default the only one that the dataset holds, else the
-            description of the task.
+        task: Task text of episodes whose own cannot be read; by default the one that the session names, else the only
+            one that the dataset holds, else the description of the task.
 
     Raises:
         DatasetError: The session does not fit the dataset, no episode was finished, or the states of the re-simulation
@@ -69,7 +69,7 @@ def recover_recording(root: Path, session_path: Path, *, out: Path | None = None
     finished = finished_episodes(session, remains)
     require_one_kind(finished, remains, session_path)
     spec = finished[0].spec
-    texts = [remains.text_of(episode.episode_index, task, spec.description) for episode in finished]
+    texts = [remains.text_of(e.episode_index, task or e.session.task, spec.description) for e in finished]
     with workspace(beside=out or root) as folder:
         _write(folder / "recovered", finished, texts, remains)
         aside = None if out else _free_name(root)

@@ -41,6 +41,7 @@ class SessionEvent(_Event):
     simulation_version: int
     env: str
     settings: dict[str, Any]
+    task: str | None
 
 
 class EpisodeEvent(_Event):

@@ -100,6 +100,16 @@ def test_without_a_readable_description_the_log_alone_suffices(crashed):
     assert load(root)[0]["task"] == "go there"
 
 
+@pytest.mark.parametrize(("given", "found"), [(None, "as recorded"), ("as told", "as told")])
+def test_a_task_text_that_the_dataset_has_lost_is_that_of_the_session(crashed, given, found):
+    root, log = crashed
+    (root / "meta" / "tasks.parquet").unlink()
+    head, *events = log.read_text().splitlines()
+    log.write_text("\n".join([json.dumps(json.loads(head) | {"task": "as recorded"}), *events]) + "\n")
+    recover_recording(root, log, task=given)
+    assert load(root)[0]["task"] == found
+
+
 def test_the_episode_in_hand_is_left_out_and_one_that_the_dataset_counts_is_not(crashed, tmp_path):
     root, log = crashed
     cut_log(log, 1)  # the end of the last episode was not announced

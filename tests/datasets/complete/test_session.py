@@ -16,6 +16,7 @@ SESSION = {
     "simulation_version": REACH.simulation_version,
     "env": "toy_reach",
     "settings": toy_settings().env.as_dict(),
+    "task": None,
 }
 EPISODE = {"event": "episode", "episode_index": 0, "scene_id": 0, "target_id": 0}
 ACTION = {"event": "action", "state": [0.5, 0.5], "action": [0.25, 0.0]}
