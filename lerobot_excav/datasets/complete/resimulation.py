@@ -50,7 +50,8 @@ def complete_recording(
         Folder of the completed dataset.
 
     Raises:
-        DatasetError: A file is damaged, columns exist already, the session does not fit, or the re-simulation deviates from the recording.
+        DatasetError: A file is damaged, columns exist already, the session does not fit, or the re-simulation deviates
+            from the recording.
     """
     # A link to a dataset stays a link, and the data is completed where it lies.
     root, out = root.resolve(), out and out.absolute()
