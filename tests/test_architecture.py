@@ -27,7 +27,7 @@ LAYERS = [
     ],
     ["policies"],
 ]
-SHARED = {"errors", "setting", "whole_file"}
+SHARED = {"errors", "run_lock", "setting", "whole_file"}
 DATASET_LAYERS = ["format", "pairs", "record", "complete", "check"]
 FREE = {"plugin", "scripts.export"}
 

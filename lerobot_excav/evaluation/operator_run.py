@@ -9,12 +9,12 @@ from typing import Any
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.datasets.record.progress import EpisodeProgress
-from lerobot_excav.datasets.record.run_lock import RunLock
 from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
 from lerobot_excav.envs.configs.provenance import write_provenance
 from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.run_lock import RunLock
 from lerobot_excav.whole_file import named, write_whole
 
 

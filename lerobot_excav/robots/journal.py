@@ -57,6 +57,11 @@ class Journal:
         if self._is_cut_off:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
+    def sync(self) -> None:
+        """Wait until what was written is on the disk, where not even a power cut takes it away."""
+        assert self._file is not None  # opened
+        os.fsync(self._file.fileno())
+
     def close(self) -> None:
         """Close the file; one that this journal made and never wrote to is removed."""
         if self._file is None:

@@ -36,8 +36,9 @@ from typing import Any
 
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import DeviceError
+from lerobot_excav.errors import DatasetError, DeviceError
 from lerobot_excav.robots.journal import ForeignFileError, Journal
+from lerobot_excav.run_lock import RunLock
 
 
 def default_path(folder: str, now: datetime) -> Path:
@@ -54,6 +55,7 @@ class SessionLog:
 
     def __init__(self, path: Path, spec: TaskSpec, settings: TaskSettings, text: str | None = None) -> None:
         self.path = path
+        self._lock: RunLock | None = None
         self._journal = Journal(path, mark='"event": "session"')
         self._session: dict[str, Any] = {
             "event": "session",
@@ -83,10 +85,14 @@ class SessionLog:
         """Close the file; it is removed if it is new and no episode was recorded."""
         self._is_running = False
         self._journal.close()
+        if self._lock is not None:
+            self._lock.release()
+        self._lock = None
 
     def begin(self, episode_index: int, *, scene_id: int, target_id: int) -> None:
-        """Begin an episode."""
+        """Begin an episode; from the first one on no other robot may write into the file."""
         if not self._is_begun:
+            self._keep_others_away()
             self._write(self._session)
         self._is_begun = self._is_running = True
         self._target_id = target_id
@@ -131,14 +137,27 @@ class SessionLog:
         if self._is_begun:
             self._write({"event": "discarded"})
 
+    def _keep_others_away(self) -> None:
+        """Lock the file: the lines of two recordings could not be told apart."""
+        if self._lock is not None:
+            return
+        try:
+            self._lock = RunLock(self.path.with_name(f".{self.path.name}.lock"), self.path)
+        except DatasetError as error:
+            raise DeviceError(f"robot.session_log={str(self.path)!r}: {error}. Or give another file.") from error
+        except OSError as error:
+            raise self._failure(error) from error
+
     def _finish(self, event: str) -> None:
         if self._is_running:
-            self._write({"event": event})
+            self._write({"event": event}, is_last=True)
         self._is_running = False
 
-    def _write(self, *events: dict[str, Any]) -> None:
+    def _write(self, *events: dict[str, Any], is_last: bool = False) -> None:
         try:
             self._journal.write(*events)
+            if is_last:
+                self._journal.sync()
         except OSError as error:
             self._is_running = False
             raise self._failure(error) from error

@@ -1,6 +1,7 @@
 """Which scene and target every episode of a recording shows, also when it is recorded again or resumed."""
 
 import json
+import operator
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -96,14 +97,15 @@ def logged_starts(path: Path) -> dict[int, Start]:
     """Return scene and first target of the episodes in a session log, by number; an unreadable line counts as none."""
     starts: dict[int, Start] = {}
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
         return starts
     for line in lines:
         try:
             episode = json.loads(line)
             if episode["event"] == "episode":
-                starts[episode["episode_index"]] = episode["scene_id"], episode["target_id"]
+                index, *start = (operator.index(episode[key]) for key in ("episode_index", "scene_id", "target_id"))
+                starts[index] = start[0], start[1]
         except (ValueError, TypeError, LookupError):
             continue  # `lerobot-excav index` says what is wrong with it
     return starts

@@ -95,6 +95,15 @@ def test_a_resumed_recording_that_its_session_log_does_not_hold_is_refused(
         logging.info("Recording episode 2")
 
 
+def test_a_line_of_a_session_log_that_cannot_be_read_counts_as_none(tmp_path):
+    path = tmp_path / "session.jsonl"
+    line = {"event": "episode", "episode_index": 0, "scene_id": 3, "target_id": 1}
+    wrong = [line | {"scene_id": "3"}, line | {"target_id": None}, line | {"episode_index": [0]}]
+    whole = json.dumps(line).encode()
+    path.write_bytes(b"\n".join([whole, b"\xff\x00", *(json.dumps(each).encode() for each in wrong), whole[:30]]))
+    assert logged_starts(path) == {0: (3, 1)}
+
+
 def sentry(message, logger="lerobot.rollout.strategies.sentry"):
     logging.getLogger(logger).info(message)
 

@@ -6,6 +6,7 @@ import pytest
 
 from lerobot_excav.datasets.complete.session import read_session
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.robots.session_log import SessionLog, default_path
 
@@ -64,6 +65,28 @@ def test_an_episode_replaces_those_that_lerobot_did_not_keep(log):
     assert ends_of(log.path) == {0: (1, "ended"), 1: (2, "ended")}
     log.discard()
     assert list(ends_of(log.path)) == [0]
+
+
+def test_two_robots_do_not_mix_their_sessions_in_one_log(log):
+    second = SessionLog(log.path, SCOOP, SCOOP.make_settings())
+    second.start()
+    record(log, 0)
+    written = log.path.read_bytes()
+    with pytest.raises(DeviceError, match=r"another process is at work on \S*session\.jsonl.*give another file"):
+        record(second, 0)
+    assert log.path.read_bytes() == written
+    log.close()
+    record(second, 0)
+    second.close()
+    assert list(log.path.parent.iterdir()) == [log.path]
+
+
+def test_a_finished_episode_is_on_the_disk_before_the_next_begins(log, monkeypatch):
+    synced = []
+    monkeypatch.setattr("os.fsync", lambda _: synced.append(log.path.read_text().splitlines()[-1]))
+    record(log, 0)
+    log.end()
+    assert synced == ['{"event": "ended"}']
 
 
 def test_an_arm_whose_episodes_others_end_may_change_its_command_late():

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from lerobot_excav.datasets.format.dataset_info import INFO_PATH, PICTURE_DTYPES, DatasetInfo
 from lerobot_excav.datasets.format.frame_files import frame_files
-from lerobot_excav.datasets.format.metadata import EpisodeMetadata
+from lerobot_excav.datasets.format.metadata import EpisodeMetadata, missing_files
 from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.format.schema import ACTION_KEY
 from lerobot_excav.errors import ConfigurationError, DatasetError
@@ -29,24 +29,11 @@ def layout_problems(root: Path, info: DatasetInfo, episodes: Sequence[EpisodeMet
             continue  # reading its frames tells
         if extra:
             yield f"{path} has the columns {', '.join(extra)}, which {INFO_PATH} does not declare: LeRobot refuses them"
-    for path, first in _files(root, info, episodes).items():
-        if not path.is_file():
-            yield f"{path} is missing; meta/episodes names it for episode {first}"
+    yield from missing_files(root, info, episodes)
     yield from _setting_problems(info)
     total = sum(episode.length for episode in episodes)
     if episodes and total != info.total_frames:
         yield f"{root / INFO_PATH} counts {info.total_frames} frames, but meta/episodes has {total}"
-
-
-def _files(root: Path, info: DatasetInfo, episodes: Sequence[EpisodeMetadata]) -> dict[Path, int]:
-    """Return the files that episodes are in, each with the first such episode."""
-    files: dict[Path, int] = {}
-    for episode in episodes:
-        files.setdefault(info.data_file(root, episode.chunk_index, episode.file_index), episode.episode_index)
-        for key, place in episode.videos.items():
-            path = info.video_file(root, key, place.chunk_index, place.file_index)
-            files.setdefault(path, episode.episode_index)
-    return files
 
 
 def _setting_problems(info: DatasetInfo) -> Iterator[str]:

@@ -9,6 +9,12 @@ from numpy.typing import NDArray
 from lerobot_excav.datasets.complete.session import SessionEpisode
 from lerobot_excav.datasets.format.dataset_info import read_info
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
+from lerobot_excav.datasets.format.metadata import (
+    missing_files,
+    read_episode_metadata,
+    read_statistics,
+    read_tasks,
+)
 from lerobot_excav.datasets.format.schema import MASK_KEY, excav_features, require_columns
 from lerobot_excav.datasets.format.version_check import require_this_simulation
 from lerobot_excav.datasets.record.simulation import make_environment
@@ -19,6 +25,28 @@ from lerobot_excav.errors import DatasetError
 MASK_OVERLAP = 0.8
 """Least intersection over union of recorded and drawn mask; another graphics card may draw its border differently, but
 the patches of two targets lie apart (guess)."""
+
+
+def require_readable(root: Path) -> None:
+    """Check that LeRobot can open a recording: it asks the Hugging Face Hub for files that are missing.
+
+    Raises:
+        DatasetError: A file is missing or damaged, as after a crash.
+    """
+    try:
+        info = read_info(root)
+        episodes = read_episode_metadata(root, info)
+        for problem in missing_files(root, info, episodes):
+            raise DatasetError(problem)
+        read_tasks(root, info)
+        read_statistics(root)
+        stored = [key for key in info.features if key not in info.keys_of("video")]
+        for _ in iterate_episodes(root, stored):
+            pass
+    except DatasetError as damage:
+        raise DatasetError(
+            f"{damage}; after a crash of lerobot-record, add --recover to write its finished episodes again"
+        ) from damage
 
 
 def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:

@@ -1,6 +1,6 @@
 """Which episodes of a recording can be recovered from its session, and whether they belong together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,5 +81,5 @@ def recorded_features(episode: SessionEpisode, remains: Remains) -> dict[str, sc
     return {key: feature for key, feature in features.items() if key not in schema.excav_features(episode.spec)}
 
 
-def _essence(feature: Mapping[str, Any]) -> tuple[Any, ...]:
-    return feature.get("dtype"), tuple(feature.get("shape", ())), feature.get("names")
+def _essence(feature: schema.Feature) -> tuple[Any, ...]:
+    return feature["dtype"], feature["shape"], feature["names"]

@@ -5,21 +5,20 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import BaseModel, NonNegativeInt, ValidationError
 
+from lerobot_excav.datasets.format.reading import reading
+from lerobot_excav.datasets.format.schema import Feature
 from lerobot_excav.datasets.format.storage import Storage
 from lerobot_excav.errors import DatasetError
-
-UNREADABLE = (OSError, ValueError, LookupError, pa.ArrowException)
 
 
 class RecordedInfo(BaseModel):
     """What `meta/info.json` says: frames per second, columns by key, robot, and how many episodes were saved."""
 
     fps: int
-    features: dict[str, dict[str, Any]]
+    features: dict[str, Feature]
     robot_type: str | None
     total_episodes: NonNegativeInt
 
@@ -30,7 +29,7 @@ class Remains:
 
     Attributes:
         root: Its folder.
-        info: Its description; None if that was cut off.
+        info: Its description; None if that cannot be read.
         texts: Task texts that it holds.
         episode_texts: Task texts by episode index, of the episodes whose own can be read.
     """
@@ -54,9 +53,9 @@ class Remains:
         return next((info for info in infos if "video.codec" in info), {})
 
     @property
-    def _videos(self) -> list[dict[str, Any]]:
+    def _videos(self) -> list[Feature]:
         features = self.info.features.values() if self.info else ()
-        return [feature for feature in features if feature.get("dtype") == "video"]
+        return [feature for feature in features if feature["dtype"] == "video"]
 
     def text_of(self, episode_index: int, given: str | None, default: str) -> str:
         """Return the task text of an episode: its own, else the one given, else the only one there is.
@@ -100,14 +99,17 @@ def _read_info(path: Path) -> RecordedInfo | None:
 
 def _read_texts(path: Path) -> list[str]:
     try:
-        return [str(text) for text in pd.read_parquet(path).index]
-    except UNREADABLE:
+        with reading(path):
+            return [text for text in pd.read_parquet(path).index if isinstance(text, str)]
+    except DatasetError:
         return []
 
 
 def _read_episodes(path: Path) -> list[tuple[int, str]]:
     try:
-        rows = pq.read_table(path, columns=["episode_index", "tasks"]).to_pylist()
-        return [(row["episode_index"], str(row["tasks"][0])) for row in rows]
-    except UNREADABLE:
+        with reading(path):
+            rows = pq.read_table(path, columns=["episode_index", "tasks"]).to_pylist()
+            texts = [(row["episode_index"], next(iter(row["tasks"] or ()), None)) for row in rows]
+    except DatasetError:
         return []
+    return [(index, text) for index, text in texts if isinstance(text, str)]

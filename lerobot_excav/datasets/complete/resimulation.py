@@ -16,6 +16,7 @@ from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
 from lerobot_excav.datasets.complete.exchange import copy_foreign_files, exchange, require_free, workspace
 from lerobot_excav.datasets.complete.recording_check import (
     require_completable,
+    require_readable,
     require_recorded_targets,
     whole_episodes,
 )
@@ -49,12 +50,14 @@ def complete_recording(
         Folder of the completed dataset.
 
     Raises:
-        DatasetError: Columns exist already, the session does not fit, or the re-simulation deviates from the recording.
+        DatasetError: A file is damaged, columns exist already, the session does not fit, or the re-simulation deviates
+            from the recording.
     """
     # A link to a dataset stays a link, and the data is completed where it lies.
     root, out = root.resolve(), out and out.absolute()
     require_free(out)
     session = read_session(session_path)
+    require_readable(root)
     require_completable(root, session)
     whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
     with workspace(beside=out or root) as folder:

@@ -1,5 +1,6 @@
 """What LeRobot keeps in `meta/` beside `info.json`: task descriptions, a row per episode, statistics."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -86,6 +87,23 @@ def _videos(row: dict[str, Any], info: DatasetInfo) -> dict[str, dict[str, Any]]
         if name.startswith("videos/") and parts[0] in videos and len(parts) == 2:
             videos[parts[0]][parts[1]] = value
     return videos
+
+
+def missing_files(root: Path, info: DatasetInfo, episodes: Sequence[EpisodeMetadata]) -> Iterator[str]:
+    """Describe in plain words which of the files that episodes are in are missing.
+
+    Raises:
+        DatasetError: A pattern of `info.json` for their paths cannot be filled in.
+    """
+    files: dict[Path, int] = {}
+    for episode in episodes:
+        files.setdefault(info.data_file(root, episode.chunk_index, episode.file_index), episode.episode_index)
+        for key, place in episode.videos.items():
+            path = info.video_file(root, key, place.chunk_index, place.file_index)
+            files.setdefault(path, episode.episode_index)
+    for path, first in files.items():
+        if not path.is_file():
+            yield f"{path} is missing; meta/episodes names it for episode {first}"
 
 
 def read_tasks(root: Path, info: DatasetInfo) -> list[str]:

@@ -13,14 +13,13 @@ from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from PIL import UnidentifiedImageError
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.pairs.paired_index import write_index
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-from lerobot_excav.datasets.record.episode_store import EpisodeStore
+from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.provenance import read_provenance, write_provenance
@@ -28,8 +27,6 @@ from lerobot_excav.datasets.record.simulation import simulate_episode
 from lerobot_excav.datasets.record.workers import episode_result, require_workers, submit_episode, worker_pool
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import named
-
-Outcome = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +71,7 @@ def record_demonstrations(
     """
     require_workers(workers)
     start = time.monotonic()
-    if out.exists():
+    if out.exists() or out.is_symlink():  # a folder cannot take the place of a link that leads nowhere
         outcomes = _require_finished(out, settings, resume=resume)
         PartialRun.clear_finished(out, settings)
     else:

@@ -6,18 +6,18 @@ whole, the outcome last, so an outcome on disk means that the episode is complet
 
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from pydantic import ConfigDict, TypeAdapter, with_config
 
 from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.record.episode import Episode
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import unfinished, write_whole
@@ -29,6 +29,21 @@ PNG_LEVEL = 1
 TRACES = ("state", "action", "target_id", "task_state")
 
 
+@with_config(ConfigDict(extra="allow"))
+class Outcome(TypedDict):
+    """What came of an episode; there may be more in it, which stays."""
+
+    pair_uid: str
+    success: bool
+    frames: int
+    kept: bool
+    mask_missing_frames: int
+    metrics: dict[str, Any]
+
+
+_OUTCOME = TypeAdapter(Outcome)
+
+
 class EpisodeStore:
     """A folder of finished episodes; it is made if it is missing."""
 
@@ -36,9 +51,9 @@ class EpisodeStore:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
-    def write(self, episode: Episode, *, keep_frames: bool) -> dict[str, Any]:
+    def write(self, episode: Episode, *, keep_frames: bool) -> Outcome:
         """Write a finished episode, with its frames or without; return the outcome that was written."""
-        outcome = {
+        outcome: Outcome = {
             "pair_uid": episode.pair.uid,
             "success": episode.success,
             "frames": episode.length,
@@ -53,7 +68,7 @@ class EpisodeStore:
         write_whole(self._path(episode.pair, "json"), json.dumps(outcome))
         return outcome
 
-    def outcome(self, pair: Pair) -> dict[str, Any] | None:
+    def outcome(self, pair: Pair) -> Outcome | None:
         """Return the outcome of an episode, or None if it is not finished.
 
         Raises:
@@ -61,12 +76,12 @@ class EpisodeStore:
         """
         path = self._path(pair, "json")
         try:
-            outcome = json.loads(path.read_text(encoding="utf-8"))
+            outcome = _OUTCOME.validate_json(path.read_bytes())
         except FileNotFoundError:
             return None
         except ValueError as error:
             raise _damaged(path) from error
-        if not isinstance(outcome, dict) or outcome.get("pair_uid") != pair.uid:
+        if outcome["pair_uid"] != pair.uid:
             raise _damaged(path)
         return outcome
 
@@ -80,17 +95,14 @@ class EpisodeStore:
         assert outcome is not None
         path = self._path(pair, "npz")
         try:
-            with np.load(path) as stored:
-                arrays = {key: stored[key] for key in stored.files}
-        except (FileNotFoundError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+            with reading(path):
+                arrays = _frames(path)
+        except DatasetError as error:
             raise _damaged(path) from error
-        cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
         return Episode(
             pair=pair,
-            task=str(arrays["task"]),
-            images={camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras},
-            **{name: arrays[name] for name in TRACES},
-            success=bool(outcome["success"]),
+            **arrays,
+            success=outcome["success"],
             mask_missing_frames=outcome["mask_missing_frames"],
             metrics=outcome["metrics"],
         )
@@ -120,6 +132,15 @@ def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
     for camera, frames in episode.images.items():
         arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
     return arrays
+
+
+def _frames(path: Path) -> dict[str, Any]:
+    """Return task, images and traces from a file of `_arrays`."""
+    with np.load(path) as stored:
+        arrays = {key: stored[key] for key in stored.files}
+    cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
+    images = {camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras}
+    return {"task": str(arrays["task"]), "images": images, **{name: arrays[name] for name in TRACES}}
 
 
 def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

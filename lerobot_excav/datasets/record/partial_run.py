@@ -9,8 +9,8 @@ from typing import Any, Self
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.episode_store import EpisodeStore
-from lerobot_excav.datasets.record.run_lock import RunLock
 from lerobot_excav.errors import DatasetError, ExcavError
+from lerobot_excav.run_lock import RunLock
 from lerobot_excav.whole_file import unfinished, write_whole
 
 logger = logging.getLogger(__name__)
@@ -124,7 +124,9 @@ class PartialRun:
         if not self.dataset.exists():
             return
         for path in self.dataset.rglob("*"):
-            if not path.is_dir() and path.suffix not in _DATASET_FILES:
+            # LeRobot keeps its files in folders.
+            is_of_run = path.suffix in _DATASET_FILES and (path.parent != self.dataset or path.suffix == ".lock")
+            if not path.is_dir() and not is_of_run:
                 raise DatasetError(f"{path} is not of the run, whose dataset is made again; move it elsewhere")
         shutil.rmtree(self.dataset)
 

@@ -7,16 +7,20 @@ needs it, and failed episodes are listed nowhere else.
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.episode_store import Outcome
 from lerobot_excav.envs.configs.provenance import package_versions
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import write_whole
 
 PROVENANCE_PATH = Path("meta/excav_demonstrations.json")
+
+_OUTCOMES = TypeAdapter(list[Outcome])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,10 +33,10 @@ class Provenance:
     """
 
     settings: DemonstrationSettings
-    outcomes: list[dict[str, Any]]
+    outcomes: list[Outcome]
 
 
-def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list[dict[str, Any]]) -> None:
+def write_provenance(root: Path, settings: DemonstrationSettings, outcomes: list[Outcome]) -> None:
     """Write how a dataset was made."""
     record = {
         "packages": package_versions(),
@@ -59,5 +63,5 @@ def read_provenance(root: Path) -> Provenance:
         )
     with reading(path):
         record = json.loads(path.read_text(encoding="utf-8"))
-        settings, outcomes = dict(record["settings"]), record["episodes"]
+        settings, outcomes = dict(record["settings"]), _OUTCOMES.validate_python(record["episodes"])
     return Provenance(settings=DemonstrationSettings.from_record(settings, source=path), outcomes=outcomes)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.episode import Episode, demonstrate, replay
-from lerobot_excav.datasets.record.episode_store import EpisodeStore
+from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.selection import Schedule
@@ -22,7 +22,7 @@ from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
 
-def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> dict[str, Any]:
+def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
     """Play one episode, store it in the folder of finished ones, and return its outcome; runs in a worker."""
     episode = play_demonstration(settings, pair)
     # An episode that waited for its mask has frames that no action led to: it could not be played again.

@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -60,12 +60,12 @@ def worker_pool(workers: int) -> Iterator[Executor]:
                 os.environ[name] = value
 
 
-def submit_episode(
-    pool: Executor, progress: EpisodeProgress, play: Callable[..., dict[str, Any]], *arguments: Any
-) -> Future[dict[str, Any]]:
+def submit_episode[Result: Mapping[str, object]](
+    pool: Executor, progress: EpisodeProgress, play: Callable[..., Result], *arguments: Any
+) -> Future[Result]:
     """Submit an episode to a pool, to be counted when done; `play` returns its outcome with an entry `success`."""
 
-    def count(future: Future[dict[str, Any]]) -> None:
+    def count(future: Future[Result]) -> None:
         if not future.cancelled() and future.exception() is None:
             progress.count(success=bool(future.result()["success"]))
 
@@ -74,7 +74,7 @@ def submit_episode(
     return future
 
 
-def episode_result(pair: Pair, future: Future[dict[str, Any]]) -> dict[str, Any]:
+def episode_result[Result: Mapping[str, object]](pair: Pair, future: Future[Result]) -> Result:
     """Wait for the outcome of an episode.
 
     Raises:

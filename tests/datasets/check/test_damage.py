@@ -36,6 +36,15 @@ def test_damage_is_a_verdict_that_names_it_and_no_index_hides_it(copy, capsys, m
     assert (code, bool(printed.out), bool(printed.err)) in ((0, True, False), (2, False, True))
 
 
+def test_a_dataset_that_may_not_be_written_to_is_judged_all_the_same(copy, capsys, monkeypatch):
+    monkeypatch.setattr(quality_check, "opening_problem", lambda *_, **__: "")
+    root = copy()
+    (root / "meta/excav_pairs.parquet").unlink()
+    (root / "meta/excav_pairs.parquet").mkdir()
+    assert main(["qc", str(root), "--replays=0"]) == 0
+    assert "the verdicts are not noted in the index" in capsys.readouterr().err
+
+
 def test_what_lerobot_alone_objects_to_is_told(copy, capsys):
     root = copy()
     SEEN_BY_LEROBOT_ALONE.apply(root)

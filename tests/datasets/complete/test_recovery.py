@@ -110,6 +110,19 @@ def test_a_task_text_that_the_dataset_has_lost_is_that_of_the_session(crashed, g
     assert load(root)[0]["task"] == found
 
 
+def test_nonsense_in_what_is_left_counts_as_unreadable(crashed, tmp_path):
+    root, log = crashed
+    features = json.loads((root / "meta" / "info.json").read_text())["features"]
+    for number, change in enumerate(({"shape": None}, {"shape": 5}, {"info": 5})):
+        change_info(root, features=features | {"action": features["action"] | change})
+        assert recover_recording(root, log, out=tmp_path / f"{number}").episodes == 8
+    change_info(root, features=features)
+    episodes = pd.DataFrame({"episode_index": [0, 1, 2], "tasks": [None, [], [7]]})
+    episodes.to_parquet(next(root.glob("meta/episodes/*/*.parquet")))
+    pd.DataFrame({"task_index": [0]}).to_parquet(root / "meta" / "tasks.parquet")
+    assert recover_recording(root, log).texts == [REACH.description]
+
+
 def test_the_episode_in_hand_is_left_out_and_one_that_the_dataset_counts_is_not(crashed, tmp_path):
     root, log = crashed
     cut_log(log, 1)  # the end of the last episode was not announced

@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import toy_reach.table
-from lerobot.datasets import delete_episodes, merge_datasets, remove_feature
+from lerobot.datasets import LeRobotDataset, delete_episodes, merge_datasets, remove_feature
 from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.complete import resimulation
@@ -127,6 +127,29 @@ def test_completing_in_place_replaces_the_recording_and_the_later_of_two_lines_c
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recording", "session.jsonl"]
     with pytest.raises(DatasetError, match="already"):
         complete_recording(root, path)
+
+
+@pytest.mark.parametrize("name", ["meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/episodes", "data"])
+@pytest.mark.parametrize("is_missing", [False, True], ids=["cut off", "missing"])
+def test_a_recording_that_lerobot_cannot_open_is_named_and_the_way_out_too(
+    recording, session, tmp_path, name, is_missing
+):
+    root = tmp_path / "recording"
+    shutil.copytree(recording, root)
+    (path,) = [root / name] if (root / name).is_file() else (root / name).glob("*/*.parquet")
+    if is_missing:
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:-60])
+    with pytest.raises(DatasetError, match=r"(?s)(missing|cannot be read|JSON|has no).*add --recover to write"):
+        complete_recording(root, session())
+
+
+def test_a_recording_without_an_episode_is_refused(recording, session, tmp_path):
+    created = LeRobotDataset.create("local/none", fps=10, features={}, root=tmp_path / "none")
+    created.finalize()
+    with pytest.raises(DatasetError, match="meta/episodes is missing"):
+        complete_recording(tmp_path / "none", session())
 
 
 def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(

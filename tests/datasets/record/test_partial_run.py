@@ -2,11 +2,13 @@
 
 import errno
 import fcntl
+import json
 import logging
 import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from lerobot_excav.datasets.record.partial_run import PartialRun
@@ -128,8 +130,59 @@ def test_where_there_is_no_flock_another_lock_keeps_a_second_process_away(tmp_pa
 
 
 def test_a_run_needs_no_fcntl():
-    code = "import sys; sys.modules['fcntl'] = None; import lerobot_excav.datasets.record.run_lock"
+    code = "import sys; sys.modules['fcntl'] = None; import lerobot_excav.run_lock"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def change_outcome(json_path, _):
+    json_path.write_text(json.dumps({"pair_uid": json.loads(json_path.read_text())["pair_uid"]}))
+
+
+def change_frames(_, npz_path):
+    with np.load(npz_path) as stored:
+        arrays = {key: stored[key] for key in stored.files}
+    np.savez(npz_path, **{key: array * 0 if key.startswith("png:") else array for key, array in arrays.items()})
+
+
+def leave_out_a_trace(_, npz_path):
+    with np.load(npz_path) as stored:
+        arrays = {key: stored[key] for key in stored.files if key != "state"}
+    np.savez(npz_path, **arrays)
+
+
+@pytest.mark.parametrize("change", [change_outcome, change_frames, leave_out_a_trace])
+def test_an_episode_that_lacks_something_is_damaged_as_well(tmp_path, change):
+    with partial_run(tmp_path / "v", **ONE) as run:
+        (pair,) = toy_settings(**ONE).pairs()
+        simulate_episode(toy_settings(**ONE), pair, run.episodes)
+        change(*(next(run.episodes.glob(f"*.{suffix}")) for suffix in ("json", "npz")))
+    with pytest.raises(DatasetError, match=r"is missing or damaged; remove \S*\.json, and go on with"):
+        record_toy(tmp_path / "v", resume=True, **ONE)
+
+
+@pytest.mark.parametrize("episodes", [5, [{}], [5]])
+def test_a_finished_run_whose_record_is_damaged_is_named(tmp_path, episodes):
+    record_toy(tmp_path / "v", **ONE)
+    path = tmp_path / "v/meta/excav_demonstrations.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"episodes": episodes}))
+    with pytest.raises(DatasetError, match=r"excav_demonstrations\.json cannot be read"):
+        record_toy(tmp_path / "v", resume=True, **ONE)
+
+
+@pytest.mark.parametrize("name", ["thesis.json", "photo.png"])
+def test_files_of_others_in_the_unfinished_dataset_are_kept(tmp_path, name):
+    with partial_run(tmp_path / "v", **ONE) as run:
+        run.dataset.mkdir()
+        (run.dataset / name).write_text("mine")
+    with pytest.raises(DatasetError, match=rf"{name} is not of the run, .* move it elsewhere"):
+        record_toy(tmp_path / "v", resume=True, **ONE)
+    assert (run.dataset / name).read_text() == "mine"
+
+
+def test_a_link_that_leads_nowhere_is_in_the_way_before_anything_is_played(tmp_path):
+    (tmp_path / "v").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(DatasetError, match=r"--out=.*v exists"):
+        record_toy(tmp_path / "v", **ONE)
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
