@@ -97,10 +97,13 @@ class TrainingMasks:
             return
         index, episode = (int(batch[key].flatten()[row]) for key in ("index", "episode_index"))
         try:
-            stored = stored_mask(self._meta, str(self._key), index=index, episode=episode) > 0.5
+            pixels = stored_mask(self._meta, str(self._key), index=index, episode=episode)
         except FileNotFoundError as error:
             self._stop_comparing(str(error))
             return
+        if self._meta.features[self._key]["dtype"] == "image":  # a lossy video has other values where a mask is empty
+            self._require_white(pixels, index, episode)
+        stored = pixels > 0.5
         seen = mask[row].cpu() > 0.5
         if seen.shape != stored.shape:
             self._stop_comparing(f"a processor turns {tuple(stored.shape)} into {tuple(seen.shape)}")
@@ -112,6 +115,15 @@ class TrainingMasks:
             "every camera by itself, and so part the mask from its picture. Use transforms that leave masks as they "
             f"are: {SAFE_TRANSFORMS}. To move picture and mask together, set --policy.augment_shift_px. If a processor "
             "of your own moves both, set --policy.compare_masks=false.",
+        )
+
+    def _require_white(self, pixels: Tensor, index: int, episode: int) -> None:
+        """Refuse a mask of 0 and 1 among those of 0 and 255, as datasets that were merged may hold."""
+        high = float(pixels.max())
+        require(
+            high == 0 or high > 0.5,
+            f"{self._config.mask_key}: the mask of frame {index} (episode {episode}) has values up to "
+            f"{255 * high:.3g} of 255; cut at one half, nothing would be left of it. {STORE_255}",
         )
 
     def _stop_comparing(self, reason: str) -> None:

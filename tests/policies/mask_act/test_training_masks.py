@@ -231,6 +231,15 @@ def test_masks_that_say_nothing_in_any_frame_are_refused_before_training(tmp_pat
     trained_on(dataset, withhold_mask=True).forward(frames(dataset, range(4)))
 
 
+def test_masks_of_0_and_1_in_a_part_of_the_dataset_are_refused(tmp_path):
+    root = write(tmp_path / "data", lambda episode, frame: square(4, 4 + frame, on=1 if episode else 255))
+    dataset = opened(root)
+    policy = trained_on(dataset)
+    policy.forward(frames(dataset, range(4)))
+    with pytest.raises(ConfigurationError, match=r"frame 7 \(episode 1\) has values up to 1 of 255.*Store 0 .* 255"):
+        trained_on(dataset).forward(frames(dataset, [0, 1, 7, 8]))
+
+
 def test_masks_of_0_and_1_are_refused_without_statistics_too(policy, batch, caplog):
     agent, data = policy().train(), batch(actions=True)
     agent.forward({**data, MASK: torch.zeros_like(data[MASK])})
