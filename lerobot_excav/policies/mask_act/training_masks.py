@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 from datasets import Image
+from lerobot.configs import NormalizationMode
 from lerobot.datasets import LeRobotDatasetMetadata
 from lerobot.datasets.video_utils import decode_video_frames
 from torch import Tensor
@@ -133,6 +134,26 @@ class TrainingMasks:
             "pass unseen; safe are: %s",
             *(self._config.mask_key, reason, SAFE_TRANSFORMS),
         )
+
+
+def require_statistics(config: MaskACTConfig, meta: LeRobotDatasetMetadata) -> None:
+    """Raise `ConfigurationError` if a dataset has no statistics for what is normalised: LeRobot leaves it as it is.
+
+    `--rename_map` renames observations, not their statistics. A checkpoint without them could not be loaded.
+    """
+    features = {**config.input_features, **config.output_features}
+    modes = config.normalization_mapping
+    normalised = {
+        key
+        for key, feature in features.items()
+        if modes.get(feature.type.value, NormalizationMode.IDENTITY) is not NormalizationMode.IDENTITY
+    }
+    missing = sorted(normalised - {config.mask_key} - (meta.stats or {}).keys())
+    require(
+        not missing or not meta.stats,
+        f"the dataset has no statistics for {', '.join(missing)} (meta/stats.json), so LeRobot would not normalise it. "
+        "--rename_map renames no statistics: name the features in the dataset as the policy does.",
+    )
 
 
 def stored_key(config: MaskACTConfig, meta: LeRobotDatasetMetadata) -> str | None:

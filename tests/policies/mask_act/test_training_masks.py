@@ -165,6 +165,14 @@ def test_a_mask_renamed_on_the_way_is_compared_with_its_own_column(folders, tmp_
         tuned().forward(moved(batch, [2]))
 
 
+def test_a_camera_renamed_on_the_way_has_no_statistics_and_is_refused(folders):
+    dataset = opened(folders / "image")
+    policy = trained_on(dataset)
+    dataset.meta.stats["observation.images.cam"] = dataset.meta.stats.pop(MAIN)
+    with pytest.raises(ConfigurationError, match=rf"no statistics for {MAIN} .*rename_map renames no statistics"):
+        make_policy(policy.config, ds_meta=dataset.meta, rename_map={"observation.images.cam": MAIN})
+
+
 def test_what_cannot_be_compared_is_said(folders, tmp_path, caplog):
     dataset = opened(shutil.copytree(folders / "image", tmp_path / "data"))
     batch = frames(dataset, range(4))
