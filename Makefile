@@ -79,7 +79,7 @@ $(NEWEST)/.ready: pyproject.toml $(READY)
 	@$(UV) pip install --quiet --python $(NEWEST)/bin/python --editable . $(TOOLS)
 	@touch $@
 
-fuzz: $(READY) ## random commands to machine and soil, and randomly changed files and settings (an hour or more)
+fuzz: $(READY) ## random commands to machine and soil, and random changes of every file and setting (hours)
 	@OMP_NUM_THREADS=1 $(RUN)/pytest tests/fuzz --hypothesis-profile=fuzz
 
 lint: $(READY) ## check style

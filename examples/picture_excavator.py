@@ -1,6 +1,6 @@
 """Draw the picture of the README: the excavator at work, with the commanded dig region tinted.
 
-Usage: python examples/picture_excavator.py docs/images/dig.png [SCENE_ID TARGET_ID]
+Usage: python examples/picture_excavator.py outputs/dig.png [SCENE_ID TARGET_ID]
 """
 
 import sys
@@ -36,6 +36,8 @@ def main(path: Path, scene_id: int, target_id: int) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     if Path(sys.argv[1]).exists():
         sys.exit(f"{sys.argv[1]} exists; choose another file, or remove it first")
     numbers = [int(word) for word in sys.argv[2:4]] or [3, 2]

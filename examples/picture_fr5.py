@@ -1,6 +1,6 @@
 """Draw the picture of the FR5 environment: the start with the commanded block tinted, and the arm with it in the air.
 
-Usage: python examples/picture_fr5.py docs/images/blocks.png [SCENE_ID TARGET_ID]
+Usage: python examples/picture_fr5.py outputs/blocks.png [SCENE_ID TARGET_ID]
 """
 
 import sys
@@ -40,6 +40,8 @@ def main(path: Path, scene_id: int, target_id: int) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     if Path(sys.argv[1]).exists():
         sys.exit(f"{sys.argv[1]} exists; choose another file, or remove it first")
     numbers = [int(word) for word in sys.argv[2:4]] or [3, 1]

@@ -1,6 +1,7 @@
 """One process at a time: a lock that ends with its process, however that ends."""
 
 import errno
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,10 +21,11 @@ class RunLock:
         place: What is locked, as messages name it.
 
     Raises:
-        DatasetError: Another process holds the lock, or nothing can be locked there.
+        DatasetError: Another process holds the lock, nothing can be locked there, or the file is somebody else's.
     """
 
     def __init__(self, path: Path, place: Path) -> None:
+        _require_lock_file(path)
         self._lock = FileLock(path)
         try:
             self._lock.acquire(timeout=0)
@@ -42,3 +44,9 @@ class RunLock:
         with suppress(OSError):  # Windows removes it on release, and not before
             Path(self._lock.lock_file).unlink(missing_ok=True)
         self._lock.release()
+
+
+def _require_lock_file(path: Path) -> None:
+    """Raise `DatasetError` if something else lies there: a lock is empty, or begins with the number of its process."""
+    if path.is_file() and re.match(rb"\Z|\d+\s", path.read_bytes()) is None:
+        raise DatasetError(f"{path} is needed as a lock and holds something else; move it elsewhere")

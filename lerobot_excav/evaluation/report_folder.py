@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
@@ -21,11 +22,11 @@ LIST = "report_files.json"
 
 
 class _Listed(BaseModel):
-    """What reports have written: by name, digests (SHA-256); two while a file is being replaced."""
+    """What reports have written: by name, digests (SHA-256), several while a file is being replaced."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
-    written_by: str = "lerobot-excav report"
+    written_by: Literal["lerobot-excav report"]
     files: dict[str, list[str]] = {}
 
 
@@ -75,7 +76,7 @@ class ReportFolder:
             fresh = {p.relative_to(stage).as_posix(): _digest(p) for p in sorted(stage.rglob("*")) if p.is_file()}
             self.require_free(fresh)
             # Both are listed while they change places, so that a kill leaves no file that is nobody's.
-            self._list({**self._files, **{n: [*self._files.get(n, [])[-1:], digest] for n, digest in fresh.items()}})
+            self._list({**self._files, **{n: [*self._files.get(n, []), digest] for n, digest in fresh.items()}})
             for name in fresh:
                 (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (stage / name).replace(self.folder / name)
@@ -93,7 +94,8 @@ class ReportFolder:
 
     def _list(self, files: dict[str, list[str]]) -> None:
         self._files = files
-        write_whole(self.folder / LIST, json.dumps(_Listed(files=files).model_dump(), indent=1) + "\n")
+        listed = _Listed(written_by="lerobot-excav report", files=files)
+        write_whole(self.folder / LIST, json.dumps(listed.model_dump(), indent=1) + "\n")
 
 
 def _digest(path: Path) -> str:

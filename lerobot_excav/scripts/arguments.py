@@ -165,7 +165,8 @@ def _with_texts_quoted(kind: type[Arguments], options: Sequence[str]) -> list[st
 
 
 def _quoted(text: str) -> str:
-    is_as_it_is = text in ("", "null") or text[0] in "'\""
+    is_quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "'\""
+    is_as_it_is = is_quoted or text in ("", "null")
     return text if is_as_it_is else json.dumps(text, ensure_ascii=False)
 
 

@@ -1,6 +1,7 @@
 """A report replaces and removes its own files only."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -72,6 +73,23 @@ def test_a_report_that_was_killed_while_it_replaced_can_be_written_again(tmp_pat
     assert texts(tmp_path) == {"a.md": "newer", "b.md": "newer"}
 
 
+def test_a_report_that_was_killed_twice_before_it_replaced_anything_can_be_written_again(tmp_path, monkeypatch):
+    write(tmp_path, a_md="old")
+    for text in ("new", "newer"):
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "replace", replace_the_list_only)
+            with pytest.raises(KeyboardInterrupt):
+                write(tmp_path, a_md=text)
+    write(tmp_path, a_md="newest")
+    assert texts(tmp_path) == {"a.md": "newest"}
+
+
+def replace_the_list_only(path, target, replace=Path.replace):
+    if target.name != LIST:
+        raise KeyboardInterrupt
+    return replace(path, target)
+
+
 @pytest.mark.parametrize("name", ["../thesis.tex", "/thesis.tex"])
 def test_a_list_that_names_files_elsewhere_is_refused(tmp_path, name):
     (tmp_path / LIST).write_text(json.dumps({"written_by": "lerobot-excav report", "files": {name: ["0"]}}))
@@ -79,7 +97,9 @@ def test_a_list_that_names_files_elsewhere_is_refused(tmp_path, name):
         ReportFolder(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["", "{", "3", '{"files": 3}', '{"mine": 1}'])
+@pytest.mark.parametrize(
+    "text", ["", "{", "3", "{}", '{"files": 3}', '{"files": {}, "written_by": "me"}', '{"mine": 1}']
+)
 def test_a_list_of_somebody_else_is_named(tmp_path, text):
     (tmp_path / LIST).write_text(text)
     with pytest.raises(DatasetError, match=LIST):

@@ -47,6 +47,7 @@ def parse(*argv, kind=Lunch, command="lunch"):
         (["--table=1e3", "--guest", "true"], Lunch(table=Path("1e3"), guest="true")),
         (["--guest=2026-01-01"], Lunch(guest="2026-01-01")),
         (["--guest='a'"], Lunch(guest="a")),
+        (['--guest="Best" friend'], Lunch(guest='"Best" friend')),
         (["--guest=a: [b", "--table", "@c"], Lunch(guest="a: [b", table=Path("@c"))),
     ],
 )

@@ -54,7 +54,7 @@ def read_tensors(file: Path) -> dict[str, Tensor]:
         tensors = load_file(file)
     except (OSError, SafetensorError, ValueError) as error:
         raise ConfigurationError(f"{file} cannot be read ({error}). {_DAMAGED}") from error
-    broken = [name for name, value in tensors.items() if not bool(torch.isfinite(value).all())]
+    broken = [name for name, value in tensors.items() if not _is_finite(value)]
     require(not broken, f"{file}: {_listed(broken)} {_hold(broken)} numbers that are not finite. {_DAMAGED}")
     return tensors
 
@@ -126,6 +126,11 @@ def _needed_statistics(file: Path, config: Any) -> Iterator[tuple[str, tuple[int
                 yield from ((f"{name}.{statistic}", shape) for statistic in _STATISTICS[mode])
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ConfigurationError(f"{file} is damaged ({type(error).__name__}: {error}). {_DAMAGED}") from error
+
+
+def _is_finite(value: Tensor) -> bool:
+    # PyTorch cannot tell it of all formats of one byte.
+    return bool(torch.isfinite(value if value.element_size() > 1 else value.float()).all())
 
 
 def _is_alike(found: Tensor, expected: Tensor) -> bool:

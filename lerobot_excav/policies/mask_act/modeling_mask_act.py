@@ -17,7 +17,7 @@ from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
-from lerobot_excav.policies.mask_act.training_masks import TrainingMasks
+from lerobot_excav.policies.mask_act.training_masks import TrainingMasks, require_statistics
 from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
 
 
@@ -54,7 +54,10 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         super(ACTPolicy, self).__init__(config)
         config.validate_features()
         self.config = config
-        self._training_masks = TrainingMasks(config, kwargs.get("dataset_meta"))
+        meta = kwargs.get("dataset_meta")
+        if meta is not None:
+            require_statistics(config, meta)
+        self._training_masks = TrainingMasks(config, meta)
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
         # LeRobot's `drop_queued_actions` clears what has this name.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 from datasets import Image
+from lerobot.configs import NormalizationMode
 from lerobot.datasets import LeRobotDatasetMetadata
 from lerobot.datasets.video_utils import decode_video_frames
 from torch import Tensor
@@ -97,10 +98,13 @@ class TrainingMasks:
             return
         index, episode = (int(batch[key].flatten()[row]) for key in ("index", "episode_index"))
         try:
-            stored = stored_mask(self._meta, str(self._key), index=index, episode=episode) > 0.5
+            pixels = stored_mask(self._meta, str(self._key), index=index, episode=episode)
         except FileNotFoundError as error:
             self._stop_comparing(str(error))
             return
+        if self._meta.features[self._key]["dtype"] == "image":  # a lossy video has other values where a mask is empty
+            self._require_white(pixels, index, episode)
+        stored = pixels > 0.5
         seen = mask[row].cpu() > 0.5
         if seen.shape != stored.shape:
             self._stop_comparing(f"a processor turns {tuple(stored.shape)} into {tuple(seen.shape)}")
@@ -114,6 +118,15 @@ class TrainingMasks:
             "of your own moves both, set --policy.compare_masks=false.",
         )
 
+    def _require_white(self, pixels: Tensor, index: int, episode: int) -> None:
+        """Refuse a mask of 0 and 1 among those of 0 and 255, as datasets that were merged may hold."""
+        high = float(pixels.max())
+        require(
+            high == 0 or high > 0.5,
+            f"{self._config.mask_key}: the mask of frame {index} (episode {episode}) has values up to "
+            f"{255 * high:.3g} of 255; cut at one half, nothing would be left of it. {STORE_255}",
+        )
+
     def _stop_comparing(self, reason: str) -> None:
         self._is_comparing = False
         LOG.warning(
@@ -121,6 +134,26 @@ class TrainingMasks:
             "pass unseen; safe are: %s",
             *(self._config.mask_key, reason, SAFE_TRANSFORMS),
         )
+
+
+def require_statistics(config: MaskACTConfig, meta: LeRobotDatasetMetadata) -> None:
+    """Raise `ConfigurationError` if a dataset has no statistics for what is normalised: LeRobot leaves it as it is.
+
+    `--rename_map` renames observations, not their statistics. A checkpoint without them could not be loaded.
+    """
+    features = {**config.input_features, **config.output_features}
+    modes = config.normalization_mapping
+    normalised = {
+        key
+        for key, feature in features.items()
+        if modes.get(feature.type.value, NormalizationMode.IDENTITY) is not NormalizationMode.IDENTITY
+    }
+    missing = sorted(normalised - {config.mask_key} - (meta.stats or {}).keys())
+    require(
+        not missing or not meta.stats,
+        f"the dataset has no statistics for {', '.join(missing)} (meta/stats.json), so LeRobot would not normalise it. "
+        "--rename_map renames no statistics: name the features in the dataset as the policy does.",
+    )
 
 
 def stored_key(config: MaskACTConfig, meta: LeRobotDatasetMetadata) -> str | None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from lerobot_excav.datasets.record.partial_run import PartialRun
+from lerobot_excav.datasets.record.run_lock import RunLock
 from lerobot_excav.datasets.record.simulation import simulate_episode
 from lerobot_excav.errors import DatasetError
 
@@ -101,6 +102,14 @@ def test_a_run_that_was_killed_at_once_is_in_nobodys_way(tmp_path):
     (tmp_path / "v.partial" / ".settings.json.0123456789ab.tmp").write_text("{")
     assert record_toy(tmp_path / "v", **ONE).episodes == 1
     assert [path.name for path in tmp_path.iterdir()] == ["v"]
+
+
+def test_a_file_of_somebody_else_is_not_taken_for_a_lock(tmp_path):
+    file = tmp_path / ".o.jsonl.lock"
+    file.write_text("the keys are under the mat")
+    with pytest.raises(DatasetError, match=r"\.o\.jsonl\.lock is needed as a lock .* move it elsewhere"):
+        RunLock(file, tmp_path / "o.jsonl.partial")
+    assert file.read_text() == "the keys are under the mat"
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from safetensors.torch import load_file, save_file
 
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act import export
+from lerobot_excav.policies.mask_act.checkpoint import read_tensors
 from lerobot_excav.policies.mask_act.export import export_checkpoint
 from lerobot_excav.policies.mask_act.model_card import CardFacts
 from lerobot_excav.policies.mask_act.modeling_mask_act import MaskACTPolicy
@@ -93,6 +94,15 @@ def test_an_export_stands_in_a_folder_of_its_own(checkpoint, exported):
         with pytest.raises(ConfigurationError, match=rf"out={folder} exists; choose another"):
             export_checkpoint(checkpoint, folder)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("kind", [torch.float8_e4m3fn, torch.float8_e5m2])
+def test_weights_in_eight_bits_are_read(tmp_path, kind):
+    save_file({"a": torch.tensor([0.5, -2.0]).to(kind)}, tmp_path / WEIGHTS)
+    assert read_tensors(tmp_path / WEIGHTS)["a"].float().tolist() == [0.5, -2.0]
+    save_file({"a": torch.tensor([0.5, torch.nan]).to(kind)}, tmp_path / WEIGHTS)
+    with pytest.raises(ConfigurationError, match="a holds numbers that are not finite"):
+        read_tensors(tmp_path / WEIGHTS)
 
 
 def test_an_export_that_fails_leaves_nothing(checkpoint, tmp_path, monkeypatch):

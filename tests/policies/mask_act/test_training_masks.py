@@ -165,6 +165,14 @@ def test_a_mask_renamed_on_the_way_is_compared_with_its_own_column(folders, tmp_
         tuned().forward(moved(batch, [2]))
 
 
+def test_a_camera_renamed_on_the_way_has_no_statistics_and_is_refused(folders):
+    dataset = opened(folders / "image")
+    policy = trained_on(dataset)
+    dataset.meta.stats["observation.images.cam"] = dataset.meta.stats.pop(MAIN)
+    with pytest.raises(ConfigurationError, match=rf"no statistics for {MAIN} .*rename_map renames no statistics"):
+        make_policy(policy.config, ds_meta=dataset.meta, rename_map={"observation.images.cam": MAIN})
+
+
 def test_what_cannot_be_compared_is_said(folders, tmp_path, caplog):
     dataset = opened(shutil.copytree(folders / "image", tmp_path / "data"))
     batch = frames(dataset, range(4))
@@ -229,6 +237,15 @@ def test_masks_that_say_nothing_in_any_frame_are_refused_before_training(tmp_pat
     with pytest.raises(ConfigurationError, match=message):
         trained_on(dataset)
     trained_on(dataset, withhold_mask=True).forward(frames(dataset, range(4)))
+
+
+def test_masks_of_0_and_1_in_a_part_of_the_dataset_are_refused(tmp_path):
+    root = write(tmp_path / "data", lambda episode, frame: square(4, 4 + frame, on=1 if episode else 255))
+    dataset = opened(root)
+    policy = trained_on(dataset)
+    policy.forward(frames(dataset, range(4)))
+    with pytest.raises(ConfigurationError, match=r"frame 7 \(episode 1\) has values up to 1 of 255.*Store 0 .* 255"):
+        trained_on(dataset).forward(frames(dataset, [0, 1, 7, 8]))
 
 
 def test_masks_of_0_and_1_are_refused_without_statistics_too(policy, batch, caplog):
