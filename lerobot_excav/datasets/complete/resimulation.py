@@ -99,6 +99,13 @@ def _resimulate_all(root: Path, session: dict[int, SessionEpisode]) -> dict[int,
 
 def _resimulate(recorded: EpisodeTable, session: SessionEpisode) -> Episode:
     settings = session.task_settings
+    noted = np.array([frame.action for frame in session.runs[0].frames], dtype=np.float32)
+    if not np.array_equal(noted, recorded.action):
+        frame = int(np.argmax((noted != recorded.action).any(axis=1)))
+        raise DatasetError(
+            f"episode {recorded.index}: {session.place} and the recording have different actions in frame {frame}; is "
+            "it the session of this recording?"
+        )
     columns = {name: getattr(settings, name) for name in settings.columns()}
     played = play_again(
         recorded.spec, recorded.action, session.pair, session.schedule, fps=settings.fps, columns=columns

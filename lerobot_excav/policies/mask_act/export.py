@@ -119,4 +119,9 @@ def read_config(checkpoint: Path) -> MaskACTConfig:
     except (ConfigurationError, DraccusException, TypeError, ValueError) as error:
         raise ConfigurationError(f"{checkpoint / CONFIG} cannot be used: {' '.join(str(error).split())}") from error
     config.validate_features()
+    require(
+        config.withhold_mask or config.mask_key in config.image_features,
+        f"{checkpoint / CONFIG}: mask_key={config.mask_key!r} is none of its image features "
+        f"({', '.join(sorted(config.image_features))}); take an undamaged copy of the checkpoint.",
+    )
     return config

@@ -234,3 +234,14 @@ def test_a_link_to_a_recording_stays_a_link_and_the_recording_may_be_the_working
     for name in ("linked", "here"):
         assert len(build_index(tmp_path / name)) == 19
         assert (tmp_path / name / "README.md").read_text() == "mine"
+
+
+def test_a_log_with_other_actions_than_the_recording_is_refused(recording, session, tmp_path):
+    path = session()
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    third = [line for line in lines if line["event"] == "action"][2]
+    third["action"][0] += 0.25
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(DatasetError, match=r"episode 0: .*session\.jsonl:2 .* different actions in frame 2"):
+        complete_recording(recording, path, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()

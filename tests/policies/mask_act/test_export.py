@@ -257,3 +257,10 @@ def test_a_diverged_policy_is_refused(checkpoint, tmp_path):
     change_tensors(lambda tensors: tensors["model.action_head.weight"].fill_(1e5))(checkpoint / WEIGHTS)
     with pytest.raises(ConfigurationError, match=r"action_head\.weight holds values up to 100000"):
         export_checkpoint(checkpoint, tmp_path / "out")
+
+
+def test_a_checkpoint_whose_mask_is_none_of_its_features_is_refused(checkpoint, tmp_path):
+    config = json.loads((checkpoint / "config.json").read_text())
+    (checkpoint / "config.json").write_text(json.dumps(config | {"mask_key": "observation.images.nowhere"}))
+    with pytest.raises(ConfigurationError, match=r"config\.json: mask_key='observation\.images\.nowhere' is none of"):
+        export_checkpoint(checkpoint, tmp_path / "out")
