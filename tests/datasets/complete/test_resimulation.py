@@ -240,7 +240,7 @@ def test_a_log_with_other_actions_than_the_recording_is_refused(recording, sessi
     path = session()
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     third = [line for line in lines if line["event"] == "action"][2]
-    third["action"][0] += 0.25
+    third["action"][0] = 0.25
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     with pytest.raises(DatasetError, match=r"episode 0: .*session\.jsonl:2 .* different actions in frame 2"):
         complete_recording(recording, path, out=tmp_path / "out")
