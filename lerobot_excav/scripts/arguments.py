@@ -181,7 +181,7 @@ def _require_no_truth_for_numbers(parsed: Arguments, options: Sequence[str]) -> 
         is_number = isinstance(field, int | float) and not isinstance(field, bool)
         require(
             not (is_number and name.startswith("--") and isinstance(parse_string(text), bool)),
-            f"{name}={text} is not possible; true and false are no numbers",
+            f"{name}={text} is not possible; true and false are not numbers",
         )
 
 

@@ -78,7 +78,7 @@ def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.
     targets = rows["target_id"].nunique()
     complete = rows.groupby("scene_rank")["target_id"].transform("nunique") == targets
     if episodes is not None:
-        require(episodes % targets == 0, f"--episodes={episodes} is no multiple of the {targets} targets per scene")
+        require(episodes % targets == 0, f"--episodes={episodes} is not a multiple of the {targets} targets per scene")
         scenes = episodes // targets
     ranks = rows[complete]["scene_rank"].drop_duplicates()
     if ranks.empty:
@@ -107,7 +107,7 @@ def _balanced(rows: pd.DataFrame, episodes: int | None) -> pd.DataFrame:
     if episodes is not None:
         require(
             episodes % len(counts) == 0,
-            f"--episodes={episodes} is no multiple of {len(counts)} targets, so it cannot be balanced",
+            f"--episodes={episodes} is not a multiple of {len(counts)} targets, so it cannot be balanced",
         )
         per_target = episodes // len(counts)
     groups = rows.groupby("target_id")
