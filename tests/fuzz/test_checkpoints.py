@@ -210,3 +210,17 @@ def test_an_export_that_believes_everything_is_found_out(tmp_path, trained, monk
     change = harmful("no weights", weights_change(lambda weights: weights.clear()))
     with pytest.raises(AssertionError, match="accepted in silence"):
         judge(change, trained, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fault", "found"),
+    [
+        (lambda checkpoint: {}["no such weight"], KeyError),  # a traceback
+        (lambda checkpoint: checkpoint.with_name("thesis.md").unlink(), AssertionError),  # a lost file
+    ],
+)
+def test_an_export_that_breaks_or_removes_a_file_is_found_out(tmp_path, trained, monkeypatch, fault, found):
+    read = export.read_config
+    monkeypatch.setattr(export, "read_config", lambda checkpoint: (fault(checkpoint), read(checkpoint))[1])
+    with pytest.raises(found, match=r"no such weight|lost or changed: .*thesis\.md"):
+        judge(harmless("nothing", lambda folder: None), trained, tmp_path)

@@ -161,10 +161,10 @@ def judge(change, root, folder, monkeypatch=None):
 
 
 @inputs(few=12)
-@given(change=IMAGE_CHANGES)
-def test_a_changed_dataset_is_judged_in_words(tmp_path_factory, stored, change):
+@given(change=IMAGE_CHANGES, opens=st.sampled_from([False, False, False, True]))
+def test_a_changed_dataset_is_judged_in_words(tmp_path_factory, stored, change, opens):
     with pytest.MonkeyPatch.context() as patch:
-        judge(change, stored["image"], tmp_path_factory.mktemp("d"), patch)
+        judge(change, stored["image"], tmp_path_factory.mktemp("d"), None if opens else patch)
 
 
 @inputs(few=3, many=100)

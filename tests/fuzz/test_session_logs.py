@@ -134,3 +134,18 @@ def test_a_recovery_that_believes_every_state_is_found_out(tmp_path, recorded, m
     first["action"] = [value - 0.5 if value > 0.0 else value + 0.5 for value in first["action"]]
     with pytest.raises(AssertionError, match="accepted in silence"):
         judge(harmful("another action", lambda folder: write(folder, events)), recorded, tmp_path, ["--recover"])
+
+
+@pytest.mark.parametrize(
+    ("fault", "found"),
+    [
+        (lambda log: {}["no such event"], KeyError),  # a traceback
+        (lambda log: log.with_name("thesis.md").unlink(), AssertionError),  # a lost file
+    ],
+)
+def test_a_recovery_that_breaks_or_removes_a_file_is_found_out(tmp_path, recorded, monkeypatch, fault, found):
+    (tmp_path / "thesis.md").write_text("three years of work")
+    read = recovery.read_session
+    monkeypatch.setattr(recovery, "read_session", lambda log: (fault(log), read(log))[1])
+    with pytest.raises(found, match=r"no such event|lost or changed: .*thesis\.md"):
+        judge(harmless("nothing", lambda folder: None), recorded, tmp_path, ["--recover"])
