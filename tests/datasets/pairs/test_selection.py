@@ -82,7 +82,7 @@ def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
     ("arguments", "message"),
     [
         ({"composition": "odd"}, "--select|select="),
-        ({"composition": "paired", "episodes": 6}, "no multiple of the 4 targets"),
+        ({"composition": "paired", "episodes": 6}, "not a multiple of the 4 targets"),
         ({"composition": "paired", "episodes": 4, "scenes": 1}, "exclude each other"),
         ({"composition": "balanced", "scenes": 1}, "--scenes has no meaning"),
         ({"composition": "balanced", "episodes": 3}, "cannot be balanced"),

@@ -10,11 +10,11 @@ import sys
 
 import numpy as np
 import pytest
-from lerobot_excav.datasets.record.run_lock import RunLock
 
 from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.simulation import simulate_episode
 from lerobot_excav.errors import DatasetError
+from lerobot_excav.run_lock import RunLock
 
 from ..toy import record_toy, toy_settings
 
