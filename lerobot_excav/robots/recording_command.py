@@ -28,17 +28,18 @@ UNLOGGED_STRATEGIES = ("highlight", "dagger")
 logger = logging.getLogger(__name__)
 
 
-def require_fitting_command(robot_config: Any) -> None:
+def require_fitting_command(robot_config: Any) -> Any | None:
     """Check that the command gives the robot one action per frame, and stores the mask as it is.
 
-    A warning tells of a rollout that the session log cannot describe.
+    A warning tells of a rollout that the session log cannot describe. Returns the configuration of the command, or None
+    if no command of LeRobot made the robot.
 
     Raises:
         ConfigurationError: It does not; the message holds the flags to add.
     """
     command = holder_of(robot_config, "robot")
     if command is None:
-        return
+        return None
     faults = [*_wrong_rates(command, robot_config.fps), *_blurred_mask(command)]
     if faults:
         raise ConfigurationError(
@@ -51,11 +52,12 @@ def require_fitting_command(robot_config: Any) -> None:
             f"--strategy.type={strategy} begins its episodes within a run, so the session log does not hold them and "
             "`lerobot-excav index` cannot add the excav.* columns. --strategy.type=episodic and sentry are logged."
         )
+    return command
 
 
-def recorded_text(robot_config: Any) -> str | None:
+def recorded_text(command: Any) -> str | None:
     """Return the task text that the command gives every frame that it records, or None if it records nothing."""
-    return getattr(recorded_dataset(holder_of(robot_config, "robot")), "single_task", None)
+    return getattr(recorded_dataset(command), "single_task", None)
 
 
 def recorded_dataset(command: Any) -> Any | None:

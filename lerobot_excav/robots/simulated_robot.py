@@ -52,7 +52,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     """The simulated robots that are connected in this process."""
 
     def __init__(self, config: SimulatedRobotConfig) -> None:
-        require_fitting_command(config)
+        command = require_fitting_command(config)
         super().__init__(config)
         self.config: Any = config
         self.task_spec = spec = config.task_spec
@@ -64,7 +64,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._is_homing = False
         self._held_frames = 0
         log_path = config.session_log or default_path(f"{self.name}_sessions", datetime.now())
-        self._log = SessionLog(log_path, spec, self.settings, recorded_text(config))
+        self._log = SessionLog(log_path, spec, self.settings, recorded_text(command))
         self._order = self._make_order()
         self._phases = RecordingPhases(
             on_episode=self._begin_episode,
