@@ -12,7 +12,6 @@ from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
 from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.errors import RenderingError, require, require_choice
 
-
 _EFFECTS = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_FOG, mujoco.mjtRndFlag.mjRND_REFLECTION)
 
 

@@ -87,5 +87,12 @@ def _add_plumb_line(spec: mujoco.MjSpec) -> None:
         strict=True,
     ):
         spec.worldbody.add_geom(
-            name=name, type=shape, pos=_ANYWHERE, size=size, rgba=_PLUMB_RGBA, mass=0.0, group=MACHINE_GROUP, **UNTOUCHED
+            name=name,
+            type=shape,
+            pos=_ANYWHERE,
+            size=size,
+            rgba=_PLUMB_RGBA,
+            mass=0.0,
+            group=MACHINE_GROUP,
+            **UNTOUCHED,
         )

@@ -56,8 +56,6 @@ def _on_columns(raised_m: NDArray[np.float64]) -> _Columns:
     return _Columns(i, j, share[i, j], i * raised_m.shape[1] + j)
 
 
-def _settled(
-    positions_w: NDArray[np.float64], share: NDArray[np.float64], columns: NDArray[np.intp]
-) -> SettledGrains:
+def _settled(positions_w: NDArray[np.float64], share: NDArray[np.float64], columns: NDArray[np.intp]) -> SettledGrains:
     radii = _RADIUS_M * share
     return SettledGrains(positions_w - [0.0, 0.0, 1.0] * (_SINK * radii)[:, None], radii, columns)

@@ -8,16 +8,12 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
-from lerobot_excav.envs.machines.excavator.rendering import CAMERAS
+from lerobot_excav.envs.machines.excavator.features import VIEWS
 from lerobot_excav.envs.machines.excavator.scenery import PLUMB_LINE, SOIL_TEXTURE, TERRAIN_SPACING_M, build_scenery
-from lerobot_excav.envs.machines.excavator.soil_paint import TEXELS, SoilPaint
+from lerobot_excav.envs.machines.excavator.soil_paint import COMMANDED_RGB, SHOWN_RGB, TEXELS, Patch, SoilPaint
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.machines.simulator import mujoco
-from lerobot_excav.errors import require_choice
-
-VIEWS = ("overview", "side", "main", "cab")
-"""Cameras that a person may look through."""
 
 _MAX_GEOMS = 300
 _DUST, _DUST_SHADE = 0.6, 0.95  # the ground around is dusted with soil, and a little darker (kind: tuned by eye)
@@ -29,7 +25,8 @@ _LEAST_PLUMB_M = 0.05
 class WorksiteView:
     """Draws a worksite for people, as it is when a picture is asked for.
 
-    `render` raises `RenderingError` if no graphics context can be made, or the view was closed.
+    `render` raises `ConfigurationError` if there is no such camera, and `RenderingError` if no graphics context can be
+    made, or the view was closed.
 
     Args:
         worksite: Machine, soil and target box.
@@ -44,20 +41,23 @@ class WorksiteView:
         self._soil_picture = SoilPicture(self._model, worksite.machine, terrain_spacing_m=TERRAIN_SPACING_M)
         self._paint = SoilPaint()
         self._painted: tuple[bytes, ...] = ()
-        self._patch_w: NDArray[np.float64] | None = None
+        self._marked: tuple[Patch, ...] = ()
         self._pictures = CameraPictures(
-            self._model, self._data, cameras=CAMERAS, height=height, width=width, max_geoms=_MAX_GEOMS,
+            self._model, self._data, cameras=VIEWS, height=height, width=width, max_geoms=_MAX_GEOMS,
             effects=(mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_FOG),
         )  # fmt: skip
         self._all = visible_groups(SURROUNDINGS_GROUP, MACHINE_GROUP, LOOSE_SOIL_GROUP)
 
-    def mark(self, patch_w: NDArray[np.float64] | None) -> None:
-        """Tint a convex patch of the soil from now on, and no other; its corners (n, 2) [m] are counter-clockwise."""
-        self._patch_w = patch_w
+    def mark(self, commanded: NDArray[np.float64], *, shown: NDArray[np.float64] | None = None) -> None:
+        """Tint the patch of soil that is commanded, and the one that a policy was shown in its place.
+
+        Corners (n, 2) [m] are those of a convex patch, counter-clockwise from above.
+        """
+        patches = [Patch(commanded, COMMANDED_RGB)]
+        self._marked = tuple(patches if shown is None else [*patches, Patch(shown, SHOWN_RGB)])
 
     def render(self, camera: str) -> NDArray[np.uint8]:
-        """Return the colour picture (H, W, 3), uint8, of one of `VIEWS`."""
-        require_choice("render_camera", camera, VIEWS)
+        """Return the colour picture (H, W, 3), uint8, of one of `features.VIEWS`."""
         self._copy_colours()
         self._paint_soil()
         self._data.qpos[:] = self._worksite.machine.data.qpos
@@ -65,12 +65,6 @@ class WorksiteView:
         mujoco.mj_fwdPosition(self._model, self._data)
         self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
         return self._pictures.colour(camera, self._all)
-
-    @property
-    def bucket_height_m(self) -> float:
-        """How high the cutting edge is over the soil, the floor of the box or the ground [m]; below 0 in the soil."""
-        edge_w = self._worksite.machine.cutting_edge_pos_w
-        return float(edge_w[2] - self._worksite.surface_z_w(edge_w[:2]))
 
     def close(self) -> None:
         """Free the graphics context; the view cannot be used afterwards."""
@@ -94,11 +88,13 @@ class WorksiteView:
         """Paint the texture of the dig area if soil, colours or patch are not those that it shows."""
         soil, worksite = self._worksite.soil, self._worksite
         colours = {f"{name}_rgb": self._model.material(name).rgba[:3].copy() for name in ("soil", "ground")}
-        patch = b"" if self._patch_w is None else self._patch_w.tobytes()
-        shown = (soil.heights_m.tobytes(), *(rgb.tobytes() for rgb in colours.values()), patch)
+        shown = tuple(
+            values.tobytes()
+            for values in (soil.heights_m, *colours.values(), *(patch.corners_w for patch in self._marked))
+        )
         if shown == self._painted:
             return
-        picture = self._paint.paint(soil.heights_m, worksite.start_heights_m, **colours, patch_w=self._patch_w)
+        picture = self._paint.paint(soil.heights_m, worksite.start_heights_m, **colours, patches=self._marked)
         first = self._model.texture(SOIL_TEXTURE).adr[0]
         texels = (255.0 * picture + 0.5).astype(np.uint8)
         self._model.tex_data[first : first + 3 * TEXELS**2] = texels.ravel()
@@ -107,7 +103,7 @@ class WorksiteView:
 
     def _hang_plumb_line(self) -> None:
         """Draw a line from the cutting edge down to what is below it."""
-        edge_w, height_m = self._worksite.machine.cutting_edge_pos_w, max(self.bucket_height_m, 0.0)
+        edge_w, height_m = self._worksite.machine.cutting_edge_pos_w, max(self._worksite.bucket_height_m, 0.0)
         line, foot = (self._model.geom(name) for name in PLUMB_LINE)
         line.pos, foot.pos = edge_w - [0.0, 0.0, 0.5 * height_m], edge_w - [0.0, 0.0, height_m]
         line.size[1] = 0.5 * height_m

@@ -77,6 +77,12 @@ class Worksite:
         return float(box.center_w[2] + boxed[tuple(cell)])
 
     @property
+    def bucket_height_m(self) -> float:
+        """How high the cutting edge is over what lies below it [m]; below 0 in the soil."""
+        edge_w = self.machine.cutting_edge_pos_w
+        return float(edge_w[2] - self.surface_z_w(edge_w[:2]))
+
+    @property
     def time_s(self) -> float:
         """Time since the reset [s]."""
         return self._ticks * TICK_S

@@ -136,18 +136,18 @@ def test_the_operator_follows_a_new_command_before_it_digs(env):
     assert metrics["is_success"]
 
 
-def test_rendering_draws_the_main_view_once_per_frame(monkeypatch):
+def test_the_main_view_is_drawn_once_per_frame(monkeypatch):
     env = ExcavatorEnv()
     drawn = []
     render = env.renderer.render
     monkeypatch.setattr(env.renderer, "render", lambda camera: (drawn.append(camera), render(camera))[1])
     env.reset(seed=2)
-    env.render()[...] = 0
+    env.picture()[...] = 0
     assert drawn.count("main") == 1
-    assert np.array_equal(env.render(), render("main"))
+    assert np.array_equal(env.picture(), render("main"))
     for _ in range(5):
         observation = env.step(np.array([1.0, 0.5, 0.0, 0.0]))[0]
-    assert np.array_equal(env.render(), observation["pixels"]["main"])
+    assert np.array_equal(env.picture(), observation["pixels"]["main"])
     assert drawn.count("main") == 6
     env.close()
 
