@@ -44,7 +44,7 @@ def build_scenery(container: Container) -> mujoco.MjModel:
 def _light(spec: mujoco.MjSpec) -> None:
     """Let the sun cast shadows, open the sky, and let the ground fade into it."""
     spec.light("sun").castshadow = True
-    spec.visual.map.shadowclip = 1.6
+    spec.visual.map.shadowclip = 2.6  # wide: near the border of its map the ground shadows itself in specks
     spec.visual.map.zfar = 30.0
     spec.visual.map.fogstart, spec.visual.map.fogend = 4.0, 26.0
     spec.visual.rgba.fog = [*_HORIZON_RGB, 1.0]

@@ -23,7 +23,7 @@ _NOISE_SEED = 5  # a picture, not an experiment: the same grain in every scene
 _BARE_M = (0.004, 0.03)  # soil from the lower to the upper height fades in over the ground
 _CUT_M = (0.015, 0.09)  # so much lower than at the start, soil is shown as cut
 _CUT_SHADE = np.array([0.66, 0.60, 0.56], np.float32)  # damp soil from below is darker, and less yellow
-_HOLLOW = 2.2  # darkening of hollows, lightening of ridges, per metre
+_HOLLOW = 3.5  # darkening of hollows, lightening of ridges, per metre
 _HOLLOW_CELLS, _HOLLOW_RANGE = 3, (0.7, 1.25)
 _MARK_SHARE, _RIM_SHARE, _RIM_M = 0.42, 0.95, 0.05
 

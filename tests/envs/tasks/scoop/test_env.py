@@ -159,3 +159,28 @@ def test_successful_cycle_pays_its_soil_and_one_for_success(env):
     assert terminated
     assert metrics["is_success"] is info["is_success"] is True
     assert total == pytest.approx(metrics["retained_mass_kg"] / FULL_BUCKET_KG + 1.0)
+
+
+def test_the_caption_tells_load_and_deposit(env):
+    env.reset(options={"scene_id": 0, "target_id": 0})
+    state = env.cycle.state
+    state.bucket_mass_kg, state.deposited_mass_kg = 312.4, 95.6
+    words = env._caption().words
+    assert words[:2] == ("load 312 kg", "in the box 96 kg")
+    assert "0.0 s" in words
+
+
+@pytest.mark.parametrize(
+    ("hit", "contacts", "deposited", "failure"),
+    [
+        (None, 0, 0.0, None),
+        (True, 0, 0.0, None),
+        (False, 0, 0.0, "missed region"),
+        (True, 1, 300.0, "hit the box"),
+    ],
+)
+def test_a_failure_is_told_as_soon_as_it_is_certain(env, hit, contacts, deposited, failure):
+    env.reset(options={"scene_id": 0, "target_id": 0})
+    env.cycle.target_hit = hit
+    env.cycle.state.hard_target_contacts, env.cycle.state.deposited_mass_kg = contacts, deposited
+    assert env._caption().outcome == failure
