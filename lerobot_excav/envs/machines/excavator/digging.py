@@ -131,11 +131,12 @@ class JointResistance:
         The inertia is M + dt D: integrated implicitly, a servo's damping acts like inertia, unless it is saturated.
         """
         mujoco.mj_fwdActuation(self._model, data)
+        applied = data.qfrc_applied.copy()
         constraint = self._constraint_force(data) if data.nefc else self._no_force
         for column, unit in self._columns:
             mujoco.mj_mulM(self._model, data, column, unit)
         servos = data.actuator_force, self._torque_limit, self._added_inertia
-        forces = data.qfrc_passive, data.qfrc_actuator, data.qfrc_applied, data.qfrc_bias
+        forces = data.qfrc_passive, data.qfrc_actuator, applied, data.qfrc_bias
         return self._inertia, free_velocity(self._inertia, *servos, data.qvel, *forces, constraint)
 
     def _constraint_force(self, data: mujoco.MjData) -> Array:

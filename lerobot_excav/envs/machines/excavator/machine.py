@@ -142,10 +142,10 @@ class ExcavatorMachine:
         """Return the bucket as the soil sees it: geometry, pose and velocity now."""
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self._bucket, velocity, 0)
-        return Tool(
-            geometry=self._geometry,
+        return Tool.of_machine(
+            self._geometry,
+            np.array(self.data.xmat[self._bucket]).reshape(3, 3),
             position_w=np.array(self.data.xpos[self._bucket]),
-            rotation_w=np.array(self.data.xmat[self._bucket]).reshape(3, 3),
             linear_velocity_w=velocity[3:],
             angular_velocity_w=velocity[:3],
         )
