@@ -144,6 +144,17 @@ class Tool:
             f"rotation_w={self.rotation_w.tolist()} is a reflection; its columns must be right-handed axes.",
         )
 
+    @classmethod
+    def of_machine(cls, geometry: ToolGeometry, rotation_w: Array, **vectors_w: Array) -> "Tool":
+        """Return a tool whose pose and velocity a simulated machine has computed; they are neither copied nor checked.
+
+        `vectors_w` are the other fields by name. To be used where the machine itself watches over its state: the
+        checks of the constructor cost more than many a step of the soil.
+        """
+        tool = object.__new__(cls)
+        tool.__dict__.update(geometry=geometry, rotation_w=rotation_w, **vectors_w)
+        return tool
+
     @property
     def pitch_rad(self) -> float:
         """Angle of the tool's x axis above the horizontal, in its own x-z plane, in (-pi, pi].
