@@ -29,7 +29,7 @@ class PatchKind(IntEnum):
     """Soil ahead of the plate that must fail along a plane before the plate can move into it."""
 
     PENETRATION = 1
-    """Bearing of the cutting edge and the teeth against motion along the plate."""
+    """Soil that stands against the blunt front of the cutting edge."""
 
     PRESSURE = 2
     """Soil that stands against the outer face of a plate."""
