@@ -42,6 +42,9 @@ _SIDE_ROWS, _SIDE_COLUMNS = 4, 3
 _NO_SLOPE = 0.05
 """A face whose normal has a smaller level part is level: it moves no soil aside."""
 
+_LEAST_HEIGHT_M = 1e-6
+"""Least height of a buried part of a face; against division by zero."""
+
 
 @kernel
 def buried(first: float, last: float) -> tuple[float, float, float]:
@@ -105,15 +108,20 @@ def bearing_pressure(sinkage: float, depth: float, footing: float, fall: float, 
 
 @kernel
 def wedge_pressure(
-    weighed: Array, grid: Grid, foot: Vector, normal: Array, depth: float, soil: SoilStrength
+    weighed: Array, grid: Grid, foot: Vector, top: float, normal: Array, depth: float, soil: SoilStrength
 ) -> float:
-    """Return the push per area [Pa] of the wedge before a point of a face, from its growth with the depth."""
+    """Return the push per area [Pa] of soil before the part of a face between a foot and a top above it (z).
+
+    It is what the wedge before the foot resists more than the one before the top, so a face in pieces resists as a
+    whole one. Cohesion counts in full where the soil stands by `PLATE_THICKNESS_M` above the face (depth).
+    """
     level = math.sqrt(normal[0] ** 2 + normal[1] ** 2)
     ahead = (normal[0] / level, normal[1] / level)
-    weight, sticking = passive_force(weighed, grid, foot, ahead, math.atan2(level, normal[2]), 0.0, soil)
-    # The weight grows with the square of the depth, cohesion with the depth itself.
-    growth = (2.0 * weight + min(1.0, depth / PLATE_THICKNESS_M) * sticking) / depth
-    return float(growth * normal_share(level, normal[2], soil))
+    rake = math.atan2(level, normal[2])
+    weight, sticking = passive_force(weighed, grid, foot, ahead, rake, 0.0, soil)
+    over, over_sticking = passive_force(weighed, grid, (foot[0], foot[1], top), ahead, rake, 0.0, soil)
+    more = max(0.0, weight - over) + min(1.0, depth / PLATE_THICKNESS_M) * max(0.0, sticking - over_sticking)
+    return float(more / max(top - foot[2], _LEAST_HEIGHT_M) * normal_share(level, normal[2], soil))
 
 
 @kernel
@@ -219,6 +227,7 @@ def shell_limits(
                 footing += contacts[k] * shares[k] * length * max(0.0, -normals[k, 2]) / rows
     lengths = (contact_length(outer_starts, outer_ends, shares, is_edge, width * rows, mean), PLATE_THICKNESS_M)
     press_down(sinkages, highest, shares, points[:, 2], velocities, lengths, is_edge, dt)
+    fronts = standing(heights, grid, starts, ends, normals)
     for k in range(count):
         area = width * math.sqrt(np.sum((ends[k] - starts[k]) ** 2))
         scale = soil.penetration_scale if is_edge[k] else 1.0
@@ -226,39 +235,58 @@ def shell_limits(
             breadth = PLATE_THICKNESS_M if is_edge[k] else footing
             bearing = bearing_pressure(sinkages[k], depths[k], breadth, falls[k], soil)
             limits[k] = scale * area * shares[k] * contacts[k] * normals[k, 2] ** 2 * bearing
-        if normals[k, 0] ** 2 + normals[k, 1] ** 2 > _NO_SLOPE**2:
-            push = piece_wedge(heights, weighed, grid, starts[k], ends[k], normals[k], is_edge[k], soil)
-            limits[k] += scale * area * push
+        if fronts[k, 0] > 0.0:
             if shares[k] <= 0.0:
-                points[k] = 0.5 * (outer_starts[k] + outer_ends[k])
+                points[k] = starts[k] + fronts[k, 2] * (ends[k] - starts[k])
+            if is_edge[k]:
+                push = blunt_pressure(fronts[k, 1], normals[k], soil)
+            else:
+                foot, top = foot_and_top(grid, starts, ends, normals, fronts, rows, k)
+                push = wedge_pressure(weighed, grid, foot, top, normals[k], fronts[k, 1], soil)
+            limits[k] += scale * area * fronts[k, 0] * push
     return points, limits
 
 
 @kernel
-def piece_wedge(
-    heights: Array,
-    weighed: Array,
-    grid: Grid,
-    start: Array,
-    end: Array,
-    normal: Array,
-    is_edge: bool,
-    soil: SoilStrength,
-) -> float:
-    """Return the push per area [Pa] of the soil before one piece, by the part of it that is buried."""
-    first = overlap(heights, grid, start[0], start[1], start[2], normal)
-    last = overlap(heights, grid, end[0], end[1], end[2], normal)
-    share, depth, middle = buried(first, last)
-    if share <= 0.0 or depth <= 0.0:
-        return 0.0
-    if is_edge:
-        return share * blunt_pressure(depth, normal, soil)
-    level = math.sqrt(normal[0] ** 2 + normal[1] ** 2)
-    # The wedge looks one cell ahead along the level, the overlap in so far as the face is upright.
-    back = grid.dx * (1.0 / level - 1.0)
-    foot = start + middle * (end - start)
-    place = (foot[0] - back * normal[0], foot[1] - back * normal[1], foot[2])
-    return share * wedge_pressure(weighed, grid, place, normal, depth, soil)
+def standing(heights: Array, grid: Grid, starts: Array, ends: Array, normals: Array) -> Array:
+    """Return how much of each piece has soil standing before it: share, mean depth [m] and middle, as in `buried`.
+
+    Level pieces move no soil aside and have none.
+    """
+    fronts = np.zeros((len(starts), 3))
+    for k in range(len(starts)):
+        if normals[k, 0] ** 2 + normals[k, 1] ** 2 > _NO_SLOPE**2:
+            a, b = starts[k], ends[k]
+            first = overlap(heights, grid, a[0], a[1], a[2], normals[k])
+            last = overlap(heights, grid, b[0], b[1], b[2], normals[k])
+            fronts[k] = buried(first, last)
+    return fronts
+
+
+@kernel
+def foot_and_top(
+    grid: Grid, starts: Array, ends: Array, normals: Array, fronts: Array, rows: int, k: int
+) -> tuple[Vector, float]:
+    """Return the foot of the wedge before the buried part of a piece, and the top of that part (z).
+
+    Below a face that leans over the soil, dead soil fills the space up to the farthest buried point of the row; there
+    the wedge begins. Faces that do not lean have it before them.
+    """
+    level = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
+    x, y = normals[k, 0] / level, normals[k, 1] / level
+    one = starts[k] + (fronts[k, 2] - 0.5 * fronts[k, 0]) * (ends[k] - starts[k])
+    other = starts[k] + (fronts[k, 2] + 0.5 * fronts[k, 0]) * (ends[k] - starts[k])
+    foot = one if one[2] < other[2] else other
+    farthest = 0.0
+    if normals[k, 2] < 0.0:
+        for j in range(k % rows, len(starts), rows):
+            if fronts[j, 0] > 0.0 and x * normals[j, 0] + y * normals[j, 1] > 0.0:
+                for share in (fronts[j, 2] - 0.5 * fronts[j, 0], fronts[j, 2] + 0.5 * fronts[j, 0]):
+                    point = starts[j] + share * (ends[j] - starts[j])
+                    farthest = max(farthest, x * (point[0] - foot[0]) + y * (point[1] - foot[1]))
+    # The surface is read one cell ahead of the foot, but next to an inclined face in so far as that is upright.
+    farthest -= (1.0 - level) * grid.dx
+    return (foot[0] + farthest * x, foot[1] + farthest * y, foot[2]), max(one[2], other[2])
 
 
 @kernel
@@ -285,10 +313,10 @@ def side_limits(
             k = row * _SIDE_COLUMNS + column
             points[k] = one + (column + 0.5) / _SIDE_COLUMNS * (other - one)
             x, y, z = points[k]
-            depth = overlap(heights, grid, x, y, z, normal)
+            depth = overlap(heights, grid, x, y, z - 0.5 * step, normal)
             if depth > 0.0:
-                area = length / _SIDE_COLUMNS * step / level
-                limits[k] = area * wedge_pressure(weighed, grid, (x, y, z), normal, depth, soil)
+                area, foot = length / _SIDE_COLUMNS * step / level, (x, y, z - 0.5 * step)
+                limits[k] = area * wedge_pressure(weighed, grid, foot, z + 0.5 * step, normal, depth, soil)
     return points, limits
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.braking import braking_impulse, patch_rows, solved
 from lerobot_excav.envs.machines.simulator import mujoco
-from lerobot_excav.envs.soil.patches import Patches
+from lerobot_excav.envs.soil.patches import Patches, PatchKind
 from lerobot_excav.envs.soil.tool import Reaction
 
 Array = NDArray[np.float64]
@@ -40,8 +40,11 @@ class JointResistance:
         self.force_w_n: Array = np.zeros(3)
 
     def set_reaction(self, reaction: Reaction, data: mujoco.MjData) -> None:
-        """Take the patches that hold for the coming tick; the bucket is where the soil saw it."""
-        patches = reaction.patches
+        """Take the patches that hold for the coming tick; the bucket is where the soil saw it.
+
+        The ground cannot push plates and edge harder than the machine weighs.
+        """
+        patches = reaction.patches.bounded(const.MACHINE_WEIGHT_N, PatchKind.PRESSURE, PatchKind.PENETRATION)
         rotation = data.xmat[self._bucket].reshape(3, 3)
         self._points_t = (patches.points_w - data.xpos[self._bucket]) @ rotation
         self._axes_t = _axes(patches) @ rotation
