@@ -82,6 +82,19 @@ def failure_angle(rake_rad: float, friction_rad: float, steel_rad: float) -> flo
     return 0.5 * (low + high)
 
 
+def blunt_edge_factor(friction_rad: float, steel_rad: float) -> float:
+    """Return the passive coefficient of an upright blunt edge in Balovnev's equation: its A at 90 degrees.
+
+    It is multiplied with half the weight of soil over the edge's thickness, the overburden at rest on the surface ahead
+    (its active part), and c cot(phi). Read in NASA's ow_simulator (`BalovnevModelPlugin.cpp`, `getParameterA`,
+    github.com/nasa/ow_simulator at d6e3d506).
+    """
+    s, t = math.sin(friction_rad), math.sin(steel_rad)
+    lean = steel_rad + (math.asin(t / s) if t < s else 0.5 * math.pi)
+    rough = math.cos(steel_rad) + math.sqrt(max(0.0, s * s - t * t))
+    return math.cos(steel_rad) * rough / (1.0 - s) * math.exp(lean * math.tan(friction_rad))
+
+
 @cache
 def failure_table(friction_rad: float, steel_rad: float) -> Array:
     """Return (n, 4) rows of rake [rad], failure angle [rad], cohesion and surcharge factor, by 1 degree of rake."""

@@ -1,8 +1,8 @@
 """Digging resistance: what the soil can hold against a bucket at its present pose.
 
-Three kinds of patches (`PatchKind`): the wedge before each lateral slice of the cutting edge, the bearing of the
-slice, and the pressure on the outer faces of the plates. Their limits depend on pose and ground only, not on the
-motion: that decides how much of them acts, see `patches`.
+Three kinds of patches (`PatchKind`): the wedge before each lateral slice of the cutting edge, the resistance of its
+blunt front, and the pressure on the outer faces of the plates. Their limits depend on pose, load and ground, and on how
+far plates have been pressed down, not on the direction of motion: that decides how much of them acts, see `patches`.
 """
 
 import math
@@ -11,11 +11,10 @@ import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.arrays import Array
-from lerobot_excav.envs.soil.earthmoving import failure_table
+from lerobot_excav.envs.soil.earthmoving import blunt_edge_factor, failure_table
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
-from lerobot_excav.envs.soil.plates import OuterFaces
 from lerobot_excav.envs.soil.pressure import PlatePressure
 from lerobot_excav.envs.soil.tool import Reaction, Tool, ToolGeometry
 from lerobot_excav.envs.soil.wedge import SoilStrength, edge_limits
@@ -39,6 +38,7 @@ def soil_strength(parameters: SoilParameters) -> SoilStrength:
         bearing_cohesion=cohesion,
         bearing_depth=depth,
         bearing_width=width,
+        blunt=blunt_edge_factor(p.friction_angle_rad, p.steel_friction_angle_rad),
         penetration_scale=p.penetration_scale,
         table=failure_table(p.friction_angle_rad, p.steel_friction_angle_rad),
     )
@@ -47,14 +47,15 @@ def soil_strength(parameters: SoilParameters) -> SoilStrength:
 def blade_force_n(parameters: SoilParameters, depth_m: float, rake_rad: float, width_m: float) -> Array:
     """Return the force on a flat blade that is pushed through level soil, by the kernels that the bucket uses.
 
-    The blade is thin: its edge has no bearing. No heap lies before it. The depth is that of the edge below the surface,
+    The blade is thin, and no heap lies before it. The depth is that of the edge below the surface,
     the rake counts from the horizontal. Returns the backward and the downward part [N], shape (2,).
     """
     p = parameters
     spacing = depth_m / 100.0
     level: Array = np.full((2, 2), depth_m)
     grid = Grid.centred((2, 2), 2.0 * spacing, 2.0 * spacing)
-    wedges, _ = edge_limits(level, level, grid, np.zeros((1, 3)), rake_rad, (1.0, 0.0), width_m, soil_strength(p))
+    rakes, ahead = (rake_rad, rake_rad), (1.0, 0.0)
+    wedges = edge_limits(level, level, grid, np.zeros((1, 3)), rakes, ahead, width_m, 0.0, soil_strength(p))
     angle = rake_rad + p.steel_friction_angle_rad
     return np.asarray(wedges[0] * np.array([math.sin(angle), math.cos(angle)]))
 
@@ -102,9 +103,10 @@ class SoilResistance:
         if corners_w[:, 2].min() + floor_depth_m > weighed_heights_m.max() + CLEAR_M:
             self.forget()
             return Reaction.free(payload_mass_kg, payload_com_t)
+        ground = heights_m, weighed_heights_m, grid
         patches = Patches.joined(
-            *self._edge(heights_m, weighed_heights_m, grid, tool, floor_depth_m),
-            self._plates(tool.geometry).patches(heights_m, grid, tool, floor_depth_m, dt_s),
+            self._wedges(*ground, tool, floor_depth_m, GRAVITY_M_S2 * payload_mass_kg),
+            *self._plates(tool.geometry).patches(*ground, tool, floor_depth_m, dt_s),
         )
         force, torque = patches.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
         return Reaction(
@@ -118,34 +120,41 @@ class SoilResistance:
     def _plates(self, geometry: ToolGeometry) -> PlatePressure:
         if self._pressure is None or self._geometry is None or not self._geometry.has_shape_of(geometry):
             self._geometry = geometry
-            faces = OuterFaces.of(geometry, max(2, self._slices // 2))
-            self._pressure = PlatePressure(faces, self._soil)
+            self._pressure = PlatePressure(geometry, max(2, self._slices // 2), self._soil)
         return self._pressure
 
-    def _edge(
-        self, heights_m: Array, weighed_heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float
-    ) -> tuple[Patches, Patches]:
-        """Return wedges and bearings of the slices of the edge."""
+    def _wedges(
+        self, heights_m: Array, weighed_heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, load_n: float
+    ) -> Patches:
+        """Return the wedges before the slices of the edge, with a load of some weight in the bucket."""
         geometry, rotation = tool.geometry, tool.rotation_w
-        first, second = geometry.profile_t[0], geometry.profile_t[1]
-        along_t = np.array([second[0] - first[0], 0.0, second[1] - first[1]])
-        along = rotation @ (along_t / np.linalg.norm(along_t))
+        first = geometry.profile_t[0]
+        along, opening = (_direction(rotation, first, geometry.profile_t[k]) for k in (1, -1))
         across = rotation @ -geometry.planes_t[1, :3]
         ahead = _ahead(rotation, along)
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
         edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
         raised = edges + np.array([0.0, 0.0, floor_depth_m])
-        rake = math.atan2(along[2], -(along[0] * ahead[0] + along[1] * ahead[1]))
-        width = geometry.inner_width_m
-        wedges, bearings = edge_limits(heights_m, weighed_heights_m, grid, raised, rake, ahead, width, self._soil)
-        steel, shape = self._soil.steel_friction, edges.shape
+        rakes = _rake(along, ahead), _rake(opening, ahead)
+        width = float(geometry.inner_width_m)
+        wedges = edge_limits(heights_m, weighed_heights_m, grid, raised, rakes, ahead, width, load_n, self._soil)
+        steel = self._soil.steel_friction
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
         pushes = wedges * math.cos(steel)
-        return (
-            Patches.alike(edges, np.broadcast_to(-across, shape), pushes, math.tan(steel), PatchKind.WEDGE),
-            Patches.alike(edges, np.broadcast_to(along, shape), bearings, 0.0, PatchKind.PENETRATION),
-        )
+        normals = np.broadcast_to(-across, edges.shape)
+        return Patches.alike(edges, normals, pushes, math.tan(steel), PatchKind.WEDGE)
+
+
+def _direction(rotation: Array, start_t: Array, end_t: Array) -> Array:
+    """Return the unit vector (3,) in the world from one point (x, z) of the profile to another."""
+    way = np.array([end_t[0] - start_t[0], 0.0, end_t[1] - start_t[1]])
+    return np.asarray(rotation @ (way / np.linalg.norm(way)))
+
+
+def _rake(upwards: Array, ahead: tuple[float, float]) -> float:
+    """Return the angle of a line that rises from the edge, from the horizontal behind it [rad]."""
+    return math.atan2(upwards[2], -(upwards[0] * ahead[0] + upwards[1] * ahead[1]))
 
 
 def _ahead(rotation: Array, along: Array) -> tuple[float, float]:

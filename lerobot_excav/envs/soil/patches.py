@@ -6,7 +6,7 @@ a motion is the admissible force that takes the most power from it (rate-indepen
 preferred direction of its own to jump to, can hold a tool at rest and never drives one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -29,7 +29,7 @@ class PatchKind(IntEnum):
     """Soil ahead of the plate that must fail along a plane before the plate can move into it."""
 
     PENETRATION = 1
-    """Bearing of the cutting edge and the teeth against motion along the plate."""
+    """Soil that stands against the blunt front of the cutting edge."""
 
     PRESSURE = 2
     """Soil that stands against the outer face of a plate."""
@@ -81,6 +81,12 @@ class Patches:
         """Return the patches of one kind."""
         chosen = self.kinds == kind
         return Patches(**{name: array[chosen] for name, array in vars(self).items()})
+
+    def bounded(self, total_n: float, *kinds: PatchKind) -> "Patches":
+        """Return the same patches, those of some kinds scaled down so that their limits add up to a total [N] at most."""
+        chosen = np.isin(self.kinds, kinds)
+        share = total_n / max(float(self.limits_n[chosen].sum()), total_n)
+        return replace(self, limits_n=np.where(chosen, share * self.limits_n, self.limits_n))
 
     def wrench(self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array) -> tuple[Array, Array]:
         """Return force [N] and torque about the origin [N m] on a tool that moves on unhindered, both (3,).

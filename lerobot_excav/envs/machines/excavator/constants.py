@@ -45,6 +45,10 @@ BUCKET_MASS_KG = 210.0  # Komatsu PC78US-8 brochure (kind: datasheet)
 BUCKET_COM_T = (0.55, 0.0, 0.25)  # centroid of shell and ears (kind: derived)
 BUCKET_INERTIA_KGM2 = (22.0, 30.0, 32.0)  # hollow box of that mass (kind: derived)
 
+MACHINE_WEIGHT_N = GRAVITY_M_S2 * (
+    UNDERCARRIAGE_MASS_KG + HOUSE_MASS_KG + BOOM_MASS_KG + ARM_MASS_KG + BUCKET_MASS_KG
+)  # plates that the ground pushes harder would lift the machine, which stands fixed here (kind: derived)
+
 # --- bucket -----------------------------------------------------------------------------------------
 
 BUCKET_INNER_WIDTH_M = 0.72  # 750 mm outside (PC78US-8), less the side plates (kind: derived)

@@ -7,7 +7,7 @@ from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.braking import braking_impulse, patch_rows, solved
 from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.patches import Patches
+from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.tool import Reaction
 
 Array = NDArray[np.float64]
@@ -102,8 +102,11 @@ class JointResistance:
         self.force_w_n: Array = np.zeros(3)
 
     def set_reaction(self, reaction: Reaction, data: mujoco.MjData) -> None:
-        """Take the patches that hold for the coming tick; the bucket is where the soil saw it."""
-        patches = reaction.patches
+        """Take the patches that hold for the coming tick; the bucket is where the soil saw it.
+
+        The ground cannot push plates and edge harder than the machine weighs.
+        """
+        patches = reaction.patches.bounded(const.MACHINE_WEIGHT_N, PatchKind.PRESSURE, PatchKind.PENETRATION)
         self._limits = const.SUBSTEP_S * patches.limits_n
         if len(patches) == 0:
             return
