@@ -185,7 +185,7 @@ def cut_column(
         # plate may have risen above it by then.
         taken = min(max(0.0, heights[i, j] - low) * area, room - entered)
         if taken > 0.0:
-            heights[i, j] -= taken / area
+            heights[i, j] = max(low, heights[i, j] - taken / area)
             now = to_tool(pose_now.position, pose_now.rotation, x, y, low)
             gather(intake, now[0], now[1], now[2], taken)
             entered += taken

@@ -13,7 +13,7 @@ from lerobot_excav.envs.soil.motion import Pose, largest_motion, path
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.dynamics import Laws
-from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
+from lerobot_excav.envs.soil.parcels.ground import Site, places_below
 from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Landed, Population
 from lerobot_excav.envs.soil.parcels.store import WALLS
@@ -93,8 +93,8 @@ class LooseSoil:
         left = self.population.add(positions, velocities, masses_kg, apart=apart)
         if not left.any():
             return 0.0
-        points, site = positions[left, :2], self._site()
-        place = np.array([ground_below(site, x, y)[0] for x, y in points], dtype=np.uint8)
+        points = np.ascontiguousarray(positions[left, :2])
+        place = places_below(self._site(), points)
         return self._merge(Landed(points_w=points, masses_kg=masses_kg[left], place=place))
 
     def step(

@@ -36,7 +36,10 @@ def integrate(state: State, dt: float) -> None:
 def advance(
     state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws, dt: float, steps: int, pushes: Array
 ) -> float:
-    """Advance all parcels by some sub-steps and add up the pushes on the load; return the fastest hit on a sleeping parcel [m/s]."""
+    """Advance all parcels by some sub-steps and add up the pushes on the load.
+
+    Returns the fastest hit on a sleeping parcel [m/s].
+    """
     hit = 0.0
     state.ground[:] = TOUCHES_NOTHING
     for step in range(steps):
@@ -49,7 +52,7 @@ def advance(
             press_bucket(state, step, tool, site.grid.dx, laws.steel, dt, pushes)
         press_ground(state, site, laws.ground, dt)
         if site.box.half_x > 0.0:
-            press_box(state, len(tool.profile) + 1, site.box, laws.steel, dt, pushes)
+            press_box(state, len(tool.profile) + 1, site.box, laws.steel, dt)
         integrate(state, dt)
     if tool.present:
         carry(state, tool, steps)

@@ -160,9 +160,8 @@ class Population:
         points = np.concatenate([state.positions, positions])
         moving = np.concatenate([state.velocities, velocities])
         masses = np.concatenate([state.masses, masses_kg])
-        closed = np.concatenate([state.asleep, np.zeros(len(positions), dtype=np.uint8)])
         most_kg = max(MOST_JOINED * self._mass_kg, float(masses_kg.max(initial=0.0)))
-        fate = join(points, moving, masses, closed, old, free, most_kg, self._radius_m if apart else 0.0)
+        fate = join(points, moving, masses, state.asleep, free, most_kg, self._radius_m if apart else 0.0)
         state.positions[:], state.velocities[:], state.masses[:] = points[:old], moving[:old], masses[:old]
         stay = old + np.flatnonzero(fate[old:] == STAYS)
         self._append(points[stay], moving[stay], masses[stay])
