@@ -110,7 +110,8 @@ class Soil:
     def add_parcels(self, positions_w: ArrayLike, velocities_w: ArrayLike) -> None:
         """Add loose soil at (n, 3) centres [m]; each parcel brings `parcel_mass_kg` into the ledger.
 
-        Beyond the fidelity's bound on awake parcels, a new one joins its nearest one.
+        One that begins inside another one, or is beyond the fidelity's bound on awake parcels, joins one near it. If
+        those have taken up enough already, it lands at once on what is below it.
 
         Raises:
             ConfigurationError: The shapes are not the same (n, 3), or a value is not finite.
@@ -125,7 +126,7 @@ class Soil:
         require(finite, "positions_w or velocities_w holds values that are not finite.")
         positions[:, 2] += self.floor_depth_m
         masses = np.full(len(positions), self.parcel_mass_kg)
-        self._loose.population.add(positions, velocities, masses)
+        self._out_of_bounds_kg += self._loose.add(positions, velocities, masses, apart=True)
         self._load_kg, _ = self._weighed_load(None)  # one may have joined the load
 
     def step(self, dt_s: float = TICK_S, tool: Tool | None = None) -> Reaction:
@@ -166,14 +167,16 @@ class Soil:
         if tool is None:
             return Reaction.free(self.payload_mass_kg, com_t)
         ground = self._field.heights, self._loose.weighed_heights(), self._field.grid
-        return self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
+        reaction = self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
+        return reaction.with_impulse(self._loose.population.impact.impulse)
 
     def _give_birth(self, *, is_last: bool) -> None:
         """Turn the soil that has entered the bucket into parcels at rest, where it was."""
         points_t, masses = self._bucket.births(all_of_it=is_last, rng=self._rng)
         pose = self._bucket.pose
         if len(masses) and pose is not None:
-            self._loose.population.add(pose.place(points_t), np.zeros_like(points_t), masses)
+            born = pose.place(points_t), np.zeros_like(points_t), masses
+            self._out_of_bounds_kg += self._loose.add(*born, apart=False)
 
     def _weighed_load(self, tool: Tool | None) -> tuple[float, Array]:
         """Return mass [kg] and centre of mass (3,) [m] of the load; the centroid of an empty bucket."""

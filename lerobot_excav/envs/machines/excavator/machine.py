@@ -8,6 +8,7 @@ from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.control import RateControl, checked_action
 from lerobot_excav.envs.machines.excavator.digging import JointResistance
+from lerobot_excav.envs.machines.excavator.impact import SoilImpact
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
@@ -42,6 +43,7 @@ class ExcavatorMachine:
         self._control = RateControl()
         self._resistance = JointResistance(self.model)
         self._payload = Payload(self.model)
+        self._impact = SoilImpact(self.model)
         self._geometry = bucket_geometry()
         self._bucket = self.model.body("bucket").id
         self._edge_site = self.model.site("cutting_edge").id
@@ -88,6 +90,7 @@ class ExcavatorMachine:
             mujoco.mj_step1(model, data)
             applied[:] = 0.0
             self._payload.apply_momentum(data)
+            self._impact.apply(data, reaction)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)
             if data.ncon:
