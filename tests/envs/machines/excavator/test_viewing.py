@@ -71,7 +71,7 @@ def test_a_marked_patch_is_tinted_and_nothing_else(site, view, camera):
     changed = (marked != plain).any(axis=-1)
     assert changed.sum() > 60
     points_w = seen_points_w(view, camera)
-    outside = (np.abs(points_w[..., :2]) > 0.4 + 0.2).any(axis=-1)  # more than a pixel away
+    outside = (np.abs(points_w[..., :2]) > 0.4 + 0.4).any(axis=-1)  # more than a pixel, of a low view, away
     assert not changed[outside].any()
     inside = (np.abs(points_w[..., :2]) < 0.3).all(axis=-1)
     assert changed[inside].mean() > 0.95
