@@ -214,6 +214,7 @@ ENV = {
     "metrics_path": optional(path),
     "metrics_episodes": optional(whole(1)).beside(metrics_path="x"),
     "render_mode": optional(one_of("rgb_array")),
+    **dict.fromkeys(("render_height", "render_width"), whole(32, 1024)),
     "max_parallel_tasks": whole(1, 1),
     "disable_env_checker": flag,
 }
@@ -315,8 +316,12 @@ SOIL_TABLE = {
 
 CONFIGURATIONS = {
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
-    "excavator": (ExcavatorEnvConfig, EXCAVATOR | ENV, {}),
-    "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV, {}),
+    "excavator": (
+        ExcavatorEnvConfig,
+        EXCAVATOR | ENV | {"render_camera": one_of("overview", "side", "main", "cab")},
+        {},
+    ),
+    "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV | {"render_camera": one_of("overview", "main", "top")}, {}),
     "excavator_sim": (ExcavatorSimConfig, EXCAVATOR | ROBOT, {}),
     "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS))}, {}),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),

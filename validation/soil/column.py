@@ -31,6 +31,7 @@ class Collapse(NamedTuple):
     stop_time: float  # until the radius is within 2 % of its last value, over sqrt(h0 / g)
     parcel_count: float
     cone_run_out: float  # of the same column in a height field that only relaxes
+    simulated_s: float  # until all of it was at rest
 
 
 def sand_with_friction(friction_deg: float) -> SoilParameters:
@@ -57,6 +58,7 @@ def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: 
         stop_time=stop / math.sqrt(height / GRAVITY_M_S2),
         parcel_count=len(points),
         cone_run_out=_cone_radius(soil, radius, height) / radius - 1.0,
+        simulated_s=TICK_S * len(radii),
     )
 
 

@@ -91,7 +91,7 @@ def _table(found: Found) -> Table:
     rows = []
     for phi, groups in found.items():
         for runs in groups:
-            a, run_out, height, stop_time, _, cone = _mean(runs)
+            a, run_out, height, stop_time, _, cone, _ = _mean(runs)
             spread = float(np.ptp([one.run_out for one in runs]))
             run_outs = (run_out, spread, LUBE.run_out(a), LAJEUNESSE.run_out(a), cone)
             rows.append((phi, a, *run_outs, height, LUBE.height(a), LAJEUNESSE.height(a), stop_time))

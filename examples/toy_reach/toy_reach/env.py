@@ -27,6 +27,9 @@ class ReachEnv(MaskedTaskEnv[Table, TableRenderer]):
     def _make_renderer(self, world: Table, height: int, width: int) -> TableRenderer:
         return TableRenderer(world, height=height, width=width)
 
+    def _make_view(self, height: int, width: int) -> TableRenderer:
+        return TableRenderer(self.world, height=height, width=width)
+
     def _start(self, scene_id: int, target_id: int) -> None:
         self.world.reset(draw_spots(self.settings.scene_set, scene_id))
         self._target, self._on_target = target_id, 0

@@ -30,6 +30,7 @@ REACH = TaskSpec(
     robot_type="toy_reach_sim",
     description="Slide to the spot that the mask marks.",
     cameras=("main", "near", "target_mask"),
+    views=("overview", "main"),
     state_names=("x.pos", "y.pos"),
     action_names=("x.vel", "y.vel"),
     action_low=(-1.0, -1.0),

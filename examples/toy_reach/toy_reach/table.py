@@ -8,8 +8,10 @@ from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 
 SPOT_RADIUS_M = 0.12
+RING_RADIUS_M = 0.16
 SPEED_M_S = 1.0
 SPOT_RGB = np.array([(210, 40, 40), (40, 160, 60), (50, 70, 210), (220, 190, 40)], np.uint8)
+WHITE_RGB, BLUE_RGB = np.array([(255, 255, 255), (40, 110, 235)], np.uint8)
 TABLE_RGB = {"wood": (150, 115, 80), "ice": (190, 215, 235)}
 SLIP = {"wood": 0.0, "ice": 0.9}
 """Share of its velocity that the disc keeps from tick to tick."""
@@ -73,6 +75,7 @@ class TableRenderer:
         # The plane z = 0 of the table along every ray.
         rays_w = self._camera.points_w(np.ones((height, width))) - self._camera.position_w
         self._depth = -pose.position[2] / rays_w[..., 2]
+        self._marked: dict[int, NDArray[np.uint8]] = {}
         self.ground_w = (self._camera.position_w + self._depth[..., None] * rays_w)[..., :2]
 
     def spot_pixels(self, spot: int) -> NDArray[np.bool_]:
@@ -80,11 +83,18 @@ class TableRenderer:
         distance = np.linalg.norm(self.ground_w - self._table.spots_w[spot], axis=-1)
         return np.asarray(distance <= SPOT_RADIUS_M)
 
+    def mark(self, commanded: int, *, shown: int | None = None) -> None:
+        """Draw a white ring around the commanded spot, and a blue one around what a policy was shown in its place."""
+        self._marked = {commanded: WHITE_RGB} | ({} if shown is None else {shown: BLUE_RGB})
+
     def render(self, camera: str) -> NDArray[np.uint8]:
-        """Return a colour picture (H, W, 3); `near` is brighter, which is all that tells the two apart."""
+        """Return a colour picture (H, W, 3); all but `main` are brighter, which is all that tells them apart."""
         picture = np.tile(np.array(TABLE_RGB[self._table.surface], np.uint8), (*self._depth.shape, 1))
         for spot, rgb in enumerate(SPOT_RGB):
             picture[self.spot_pixels(spot)] = rgb
+        for spot, ring_rgb in self._marked.items():
+            distance = np.linalg.norm(self.ground_w - self._table.spots_w[spot], axis=-1)
+            picture[np.abs(distance - RING_RADIUS_M) < 0.02] = ring_rgb
         picture[np.linalg.norm(self.ground_w - self._table.pos_w, axis=-1) < 0.06] = 20
         return picture if camera == "main" else np.clip(picture, 0, 215).astype(np.uint8) + np.uint8(40)
 

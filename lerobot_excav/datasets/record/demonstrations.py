@@ -119,6 +119,7 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
                 episode = EpisodeStore(partial.episodes).read(pair)
                 with _errors_name(partial.dataset):
                     append_episode(dataset, episode, settings)
+                progress.count_written()
             outcomes.append(outcome)
     _require_any(outcomes, partial.folder)
     with _errors_name(partial.dataset):

@@ -19,6 +19,7 @@ class EpisodeProgress:
         self._start = time.monotonic()
         self._counted = 0
         self._failed = 0
+        self._written = 0
 
     def __enter__(self) -> "EpisodeProgress":
         return self
@@ -30,11 +31,21 @@ class EpisodeProgress:
         """Count an episode that has just been finished."""
         self._counted += 1
         self._failed += not success
-        minutes = max(time.monotonic() - self._start, 1e-6) / 60.0
-        text = f"{self._counted / minutes:.1f} episodes/min, {self._failed} without success"
-        self._bar.set_postfix_str(text, refresh=False)
+        self._tell(refresh=False)
         self._bar.update()
 
     def skip(self) -> None:
         """Count an episode that was finished before."""
         self._bar.update()
+
+    def count_written(self) -> None:
+        """Count an episode that is now in the dataset; with videos this takes minutes longer than playing."""
+        self._written += 1
+        self._tell(refresh=True)
+
+    def _tell(self, *, refresh: bool) -> None:
+        minutes = max(time.monotonic() - self._start, 1e-6) / 60.0
+        words = [f"{self._counted / minutes:.1f} episodes/min, {self._failed} without success"]
+        if self._written:
+            words.append(f"{self._written} written")
+        self._bar.set_postfix_str(", ".join(words), refresh=refresh)

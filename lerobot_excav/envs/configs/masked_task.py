@@ -12,14 +12,14 @@ from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.envs.tasks.masked_env import RENDER_MODES
 from lerobot_excav.envs.tasks.registry import task_of_settings, task_settings
-from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.settings import RenderSettings, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import require
-from lerobot_excav.setting import setting
+from lerobot_excav.errors import require, require_choice
+from lerobot_excav.setting import declared_settings, setting
 
 
 @dataclass(kw_only=True)
-class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class MaskedTaskEnvConfig(RenderSettings, EnvConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Set up an environment of this package from LeRobot's command line.
 
     Put the settings of a task before this class, and register the result with LeRobot:
@@ -66,6 +66,7 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
             f"env.metrics_episodes={self.metrics_episodes} has no effect without a file; "
             "give --env.metrics_path as well.",
         )
+        require_choice("env.render_camera", self.render_camera, self.task_spec.views)
         self._derive_features()
 
     @property
@@ -91,7 +92,8 @@ class MaskedTaskEnvConfig(EnvConfig):  # type: ignore[misc]  # LeRobot's classes
     def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of `gymnasium.make` besides the id."""
         settings = task_settings(cast(TaskSettings, self))
-        return {**settings.as_dict(), "render_mode": self.render_mode}
+        shown = {name: getattr(self, name) for name in declared_settings(RenderSettings)}
+        return {**settings.as_dict(), **shown, "render_mode": self.render_mode}
 
     @override
     def create_envs(

@@ -1,6 +1,6 @@
 """Pictures that the fixed cameras of a MuJoCo model take off screen: colour, distance, and what each pixel shows."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,9 +12,11 @@ from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
 from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.errors import RenderingError, require, require_choice
 
+_EFFECTS = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_FOG, mujoco.mjtRndFlag.mjRND_REFLECTION)
+
 
 class CameraPictures:
-    """Draws a model without shadows and reflections.
+    """Draws a model.
 
     All pictures share one graphics context, made with the first of them, in the process that asks for it. Threads may
     draw one after the other.
@@ -30,6 +32,7 @@ class CameraPictures:
         height: Image height H [px].
         width: Image width W [px].
         max_geoms: Most geoms that are drawn.
+        effects: What is drawn besides shapes, colours and the sky: shadows, fog, reflections. Policies see none.
     """
 
     def __init__(
@@ -41,12 +44,14 @@ class CameraPictures:
         height: int,
         width: int,
         max_geoms: int,
+        effects: Collection[Any] = (),
     ) -> None:
         require(height > 0 and width > 0, f"height={height}, width={width} must be positive")
         self._model, self._data = model, data
         self._cameras = tuple(cameras)
         self._height, self._width = height, width
         self._max_geoms = max_geoms
+        self._effects = frozenset(effects)
         self._context: OffscreenContext | None = None
         self._scene: Any = None
         self._closed = False
@@ -96,6 +101,15 @@ class CameraPictures:
                 shown[number == drawn.segid] = drawn.objid
         return shown
 
+    def send_texture(self, name: str) -> None:
+        """Let the next pictures show a texture of the model as it is now, not as it was at the first of them.
+
+        Raises:
+            RenderingError: No graphics context can be made or used, or the pictures were closed.
+        """
+        with self._opened().bound() as mjr:
+            mujoco.mjr_uploadTexture(self._model, mjr, self._model.texture(name).id)
+
     def close(self) -> None:
         """Free the graphics context; no picture can be taken afterwards."""
         self._closed = True
@@ -113,8 +127,8 @@ class CameraPictures:
         if self._context is None:
             self._context = OffscreenContext(self._model, width=self._width, height=self._height)
             self._scene = mujoco.MjvScene(self._model, maxgeom=self._max_geoms)
-            for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-                self._scene.flags[flag] = False
+            for flag in _EFFECTS:
+                self._scene.flags[flag] = flag in self._effects
         return self._context
 
     @contextmanager

@@ -44,6 +44,13 @@ def _checked_motion(geometry: ToolGeometry, before: Pose | None, now: Pose) -> f
     return moved
 
 
+def _window(geometry: ToolGeometry, pose: Pose, field: HeightField) -> Window:
+    """Return the columns whose lines may be inside of the bucket: these stand up to half a cell from the middle."""
+    corners = pose.place(geometry.corners_t)
+    half_cell = 0.5 * np.array([*field.grid.cell_m, 0.0])
+    return field.window(np.stack([corners.min(axis=0) - half_cell, corners.max(axis=0) + half_cell]))
+
+
 class Bucket:
     """One tool at work in a height field.
 
@@ -129,7 +136,7 @@ class Bucket:
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
         for start, end in path:
-            motion = geometry.planes_t, start, end, field.window(end.place(geometry.corners_t))
+            motion = geometry.planes_t, start, end, _window(geometry, end, field)
             intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
             more, over = cut(field.heights, field.active, field.grid, *motion, *intaking)
             entered += more
@@ -138,7 +145,7 @@ class Bucket:
 
     def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
         """Let the underside of the bucket hold avalanches back."""
-        window = field.window(pose.place(geometry.corners_t))
+        window = _window(geometry, pose, field)
         area = window.union(self._window)
         set_ceiling(field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, pose, area)
         field.wake()

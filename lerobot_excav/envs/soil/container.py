@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Container:
         )
         require(math.isfinite(self.yaw_rad), f"container yaw_rad={self.yaw_rad!r}; allowed: a finite angle.")
 
-    @property
+    @cached_property
     def axes_w(self) -> Array:
         """Return (2, 2) whose rows are the container's x and y axes in the world plane."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)

@@ -22,6 +22,17 @@ ALREADY_INSIDE = -1
 _LEVEL = 0.3
 """A face whose outward normal has a smaller horizontal part pushes soil along the motion instead (guess)."""
 
+_SHIFT_X, _SHIFT_Y = math.sqrt(2.0) - 1.0, 0.5 * (math.sqrt(5.0) - 1.0)
+"""By how much of a cell the line of a column moves from row to row. Multiples of the golden ratio are spread most evenly
+(Weyl's equidistribution); the other is far from it, so that rows along the diagonals are spread evenly too."""
+
+
+@kernel
+def column_line(grid: Grid, i: int, j: int) -> Level:
+    """Return where the line stands that decides whether a column is inside of a bucket [m]: within its cell."""
+    x, y = _SHIFT_X * j, _SHIFT_Y * i
+    return grid.x0 + (i + (x - math.floor(x)) - 0.5) * grid.dx, grid.y0 + (j + (y - math.floor(y)) - 0.5) * grid.dy
+
 
 @kernel
 def to_tool(position: Array, rotation: Array, x: float, y: float, z: float) -> Vector:
@@ -73,7 +84,7 @@ def crossed_face(planes: Array, before: Vector, now: Vector) -> int:
 @kernel
 def is_covered(surface: float, grid: Grid, planes: Array, pose: Pose, i: int, j: int) -> bool:
     """Tell whether a surface height of a column lies inside the bucket or above it."""
-    x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+    x, y = column_line(grid, i, j)
     low, high, _ = column_interval(planes, pose.position, pose.rotation, x, y)
     return low < high and surface > low
 
@@ -145,16 +156,16 @@ def cut_column(
     intake: Bins,
 ) -> tuple[float, float]:
     """Clear one column of the soil inside the bucket; return the volumes that entered and that left the grid."""
-    x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+    x, y = column_line(grid, i, j)
     low, high, top = column_interval(planes, pose_now.position, pose_now.rotation, x, y)
     low, high = max(low, 0.0), min(high, heights[i, j])
     if high <= low:
         return 0.0, 0.0
-    share = (high - low) / samples * grid.dx * grid.dy
+    area, entered, lost = grid.dx * grid.dy, 0.0, 0.0
+    share = (high - low) / samples * area
     # the column sinks first, so that no pushed soil comes to rest on what is being taken away
     heights[i, j] = max(0.0, heights[i, j] - (high - low))
     mark_around(active, i, j)
-    entered, lost = 0.0, 0.0
     for b in range(samples):
         z = low + (b + 0.5) * (high - low) / samples
         before = to_tool(pose_before.position, pose_before.rotation, x, y, z)
@@ -169,6 +180,15 @@ def cut_column(
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
             lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, share - taken)
+    if top == OPENING:
+        # What was above the opening has sunk to where it is open below. It must not wait for the next sub-step: the
+        # plate may have risen above it by then.
+        taken = min(max(0.0, heights[i, j] - low) * area, room - entered)
+        if taken > 0.0:
+            heights[i, j] = max(low, heights[i, j] - taken / area)
+            now = to_tool(pose_now.position, pose_now.rotation, x, y, low)
+            gather(intake, now[0], now[1], now[2], taken)
+            entered += taken
     return entered, lost
 
 
@@ -212,7 +232,7 @@ def set_ceiling(
     """
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
-            x, y = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+            x, y = column_line(grid, i, j)
             low, high, _ = column_interval(planes, pose.position, pose.rotation, x, y)
             new = low if low < high else math.inf
             if new != ceiling[i, j] and (new < heights[i, j] + grid.dx or ceiling[i, j] < heights[i, j] + grid.dx):

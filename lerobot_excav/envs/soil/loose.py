@@ -13,7 +13,7 @@ from lerobot_excav.envs.soil.motion import Pose, largest_motion, path
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.contact import Law
 from lerobot_excav.envs.soil.parcels.dynamics import Laws
-from lerobot_excav.envs.soil.parcels.ground import Site
+from lerobot_excav.envs.soil.parcels.ground import Site, places_below
 from lerobot_excav.envs.soil.parcels.plates import NO_BOX, BoxWalls, ToolPath
 from lerobot_excav.envs.soil.parcels.population import Landed, Population
 from lerobot_excav.envs.soil.parcels.store import WALLS
@@ -84,6 +84,18 @@ class LooseSoil:
         """Remove all parcels and forget the bucket."""
         self.population.clear()
         self._tool = ToolPath(0, np.zeros((2, 2)), np.zeros((4, 4)), 0.0, _NO_PLACE, _NO_TURN, np.zeros(3), np.zeros(3))
+
+    def add(self, positions: Array, velocities: Array, masses_kg: Array, *, apart: bool) -> float:
+        """Add parcels as `Population.add` does; what finds no room lands at once on what is below it.
+
+        Returns the mass [kg] that landed out of bounds.
+        """
+        left = self.population.add(positions, velocities, masses_kg, apart=apart)
+        if not left.any():
+            return 0.0
+        points = np.ascontiguousarray(positions[left, :2])
+        place = places_below(self._site(), points)
+        return self._merge(Landed(points_w=points, masses_kg=masses_kg[left], place=place))
 
     def step(
         self, geometry: ToolGeometry | None, before: Pose | None, now: Pose | None, dt_s: float, *, cutting: bool

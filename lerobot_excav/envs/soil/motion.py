@@ -28,10 +28,23 @@ class Pose(NamedTuple):
         return self.position + points_t @ self.rotation.T
 
 
+@kernel
+def _largest_motion(points: Array, before: Pose, now: Pose) -> float:
+    largest = 0.0
+    for k in range(len(points)):
+        square = 0.0
+        for a in range(3):
+            moved = now.position[a] - before.position[a]
+            for b in range(3):
+                moved += (now.rotation[a, b] - before.rotation[a, b]) * points[k, b]
+            square += moved * moved
+        largest = max(largest, square)
+    return math.sqrt(largest)
+
+
 def largest_motion(points_t: Array, before: Pose, now: Pose) -> float:
     """Return the farthest that any of (n, 3) tool points moved [m]."""
-    moved = now.place(points_t) - before.place(points_t)
-    return float(np.sqrt((moved * moved).sum(axis=1).max()))
+    return _largest_motion(points_t, before, now)
 
 
 @kernel
@@ -80,14 +93,18 @@ def path(before: Pose, now: Pose, steps: int) -> tuple[Array, Array, Array]:
 
 def _rotation_vector(rotation: Array) -> Array:
     """Return axis times angle of a rotation by less than pi."""
-    skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
-    sine = 0.5 * float(np.linalg.norm(skew))
-    angle = math.atan2(sine, 0.5 * (float(np.trace(rotation)) - 1.0))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    skew = np.array([zy - yz, xz - zx, yx - xy])
+    sine = 0.5 * math.sqrt(skew.dot(skew))
+    angle = math.atan2(sine, 0.5 * (xx + yy + zz - 1.0))
     return skew * (0.5 * angle / sine) if sine > 1e-12 else 0.5 * skew
 
 
 def poses_between(before: Pose, now: Pose, steps: int) -> Iterator[tuple[Pose, Pose]]:
     """Yield the start and end poses of equal steps along a screw-free path: straight line, constant turn."""
+    if steps == 1:
+        yield before, now
+        return
     positions, rotations, _ = path(before, now, steps)
     inner = map(Pose, positions[1:-1], rotations[1:-1])
     yield from pairwise([before, *inner, now])

@@ -15,7 +15,7 @@ from lerobot_excav.envs.soil.height_field import HeightField
 from lerobot_excav.envs.soil.loose import LooseSoil
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.soil.tool import Reaction, Tool
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.errors import ConfigurationError, require, require_choice
 
 
 def _whole_cells(length_m: float, cell_size_m: float, field: str) -> int:
@@ -104,12 +104,14 @@ class Soil:
         self._resistance.forget()
         self._out_of_bounds_m3 = 0.0
         self._out_of_bounds_kg = 0.0
+        self._load_kg = 0.0
         self._rng = np.random.default_rng(self._seed)
 
     def add_parcels(self, positions_w: ArrayLike, velocities_w: ArrayLike) -> None:
         """Add loose soil at (n, 3) centres [m]; each parcel brings `parcel_mass_kg` into the ledger.
 
-        Beyond the fidelity's bound on awake parcels, a new one joins its nearest one.
+        One that begins inside another one, or is beyond the fidelity's bound on awake parcels, joins one near it. If
+        those have taken up enough already, it lands at once on what is below it.
 
         Raises:
             ConfigurationError: The shapes are not the same (n, 3), or a value is not finite.
@@ -124,7 +126,8 @@ class Soil:
         require(finite, "positions_w or velocities_w holds values that are not finite.")
         positions[:, 2] += self.floor_depth_m
         masses = np.full(len(positions), self.parcel_mass_kg)
-        self._loose.population.add(positions, velocities, masses)
+        self._out_of_bounds_kg += self._loose.add(positions, velocities, masses, apart=True)
+        self._load_kg, _ = self._weighed_load(None)  # one may have joined the load
 
     def step(self, dt_s: float = TICK_S, tool: Tool | None = None) -> Reaction:
         """Advance by one step.
@@ -140,7 +143,8 @@ class Soil:
         Raises:
             ConfigurationError: The duration is out of range, or the tool jumped.
         """
-        require(0.0 < dt_s <= 0.1, f"dt_s={dt_s!r}; allowed: above 0 and at most 0.1 s.")
+        if not 0.0 < dt_s <= 0.1:
+            raise ConfigurationError(f"dt_s={dt_s!r}; allowed: above 0 and at most 0.1 s.")
         before, entered = self._bucket.pose, 0.0
         if tool is None:
             self._bucket.leave(self._field)
@@ -152,42 +156,40 @@ class Soil:
             self._give_birth(is_last=entered == 0.0 and load_m3 == 0.0)
         geometry = None if tool is None else tool.geometry
         self._out_of_bounds_kg += self._loose.step(geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0)
+        self._load_kg, com_t = self._weighed_load(tool)
         sweeps = max(1, round(self.fidelity.sweeps_per_tick * dt_s / TICK_S))
         for field in (self._field, self._box_field):
             self._out_of_bounds_m3 += field.relax(sweeps, self.parameters.slope_tan)
-        return self._reaction(tool, dt_s)
+        return self._reaction(tool, dt_s, com_t)
 
-    def _reaction(self, tool: Tool | None, dt_s: float) -> Reaction:
+    def _reaction(self, tool: Tool | None, dt_s: float, com_t: Array) -> Reaction:
         """Return what the soil does to the tool at the end of a step."""
-        com_t = self._payload_com_t(tool)
         if tool is None:
             return Reaction.free(self.payload_mass_kg, com_t)
         ground = self._field.heights, self._loose.weighed_heights(), self._field.grid
-        return self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
+        reaction = self._resistance.react(*ground, tool, self.floor_depth_m, dt_s, self.payload_mass_kg, com_t)
+        return reaction.with_impulse(self._loose.population.impact.impulse)
 
     def _give_birth(self, *, is_last: bool) -> None:
         """Turn the soil that has entered the bucket into parcels at rest, where it was."""
         points_t, masses = self._bucket.births(all_of_it=is_last, rng=self._rng)
         pose = self._bucket.pose
         if len(masses) and pose is not None:
-            self._loose.population.add(pose.place(points_t), np.zeros_like(points_t), masses)
+            born = pose.place(points_t), np.zeros_like(points_t), masses
+            self._out_of_bounds_kg += self._loose.add(*born, apart=False)
 
-    def _payload_com_t(self, tool: Tool | None) -> Array:
-        """Return the centre of mass of the load, or the centroid of an empty bucket [m]."""
+    def _weighed_load(self, tool: Tool | None) -> tuple[float, Array]:
+        """Return mass [kg] and centre of mass (3,) [m] of the load; the centroid of an empty bucket."""
         state, pose = self._loose.population.state, self._bucket.pose
+        rows = np.flatnonzero(state.load)
+        masses = state.masses[rows]
+        mass = float(masses.sum())
         if tool is None or pose is None:
-            return np.zeros(3)
-        is_load = state.load == 1
-        mass = float(state.masses[is_load].sum())
+            return mass, np.zeros(3)
         if mass == 0.0:
-            return tool.geometry.centroid_t
-        centre = state.masses[is_load] @ state.positions[is_load] / mass
-        return np.asarray((centre - pose.position) @ pose.rotation)
-
-    @property
-    def _load_kg(self) -> float:
-        state = self._loose.population.state
-        return float(state.masses[state.load == 1].sum())
+            return mass, tool.geometry.centroid_t
+        centre = masses @ state.positions[rows] / mass
+        return mass, np.asarray((centre - pose.position) @ pose.rotation)
 
     @property
     def heights_m(self) -> Array:

@@ -1,6 +1,6 @@
 """The digging tool as the soil sees it, and what the soil answers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from lerobot_excav.envs.soil.patches import Patches
 from lerobot_excav.errors import require
 
 _CONVEX_TOLERANCE_M2 = 1e-9
+
 
 
 def _fixed(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
@@ -144,6 +145,17 @@ class Tool:
             f"rotation_w={self.rotation_w.tolist()} is a reflection; its columns must be right-handed axes.",
         )
 
+    @classmethod
+    def of_machine(cls, geometry: ToolGeometry, rotation_w: Array, **vectors_w: Array) -> "Tool":
+        """Return a tool whose pose and velocity a simulated machine has computed; they are neither copied nor checked.
+
+        `vectors_w` are the other fields by name. To be used where the machine itself watches over its state: the
+        checks of the constructor cost more than many a step of the soil.
+        """
+        tool = object.__new__(cls)
+        tool.__dict__.update(geometry=geometry, rotation_w=rotation_w, **vectors_w)
+        return tool
+
     @property
     def pitch_rad(self) -> float:
         """Angle of the tool's x axis above the horizontal, in its own x-z plane, in (-pi, pi].
@@ -165,6 +177,10 @@ class Reaction:
         payload_mass_kg: Mass of the soil in the bucket.
         payload_com_t: (3,) its centre of mass [m]; the centroid of the bucket while that is empty.
         patches: What the soil can hold against any other motion, for a machine that solves for its own.
+        impulse_w_ns: (3,) what falling and sliding soil gave to the tool in this step [N s], beyond a payload that is
+            welded to it, whose weight and inertia the machine carries. Soil that joins the payload is taken to be at
+            rest: the machine gives it its momentum, and what fell in brings its own here.
+        angular_impulse_w_nms: (3,) the same about the tool origin [N m s].
     """
 
     force_w_n: Array
@@ -172,6 +188,12 @@ class Reaction:
     payload_mass_kg: float
     payload_com_t: Array
     patches: Patches
+    impulse_w_ns: Array = field(default_factory=lambda: np.zeros(3))
+    angular_impulse_w_nms: Array = field(default_factory=lambda: np.zeros(3))
+
+    def with_impulse(self, impulse: Array) -> "Reaction":
+        """Return the same with an impulse (6,): linear [N s], and angular about the tool origin [N m s]."""
+        return replace(self, impulse_w_ns=impulse[:3], angular_impulse_w_nms=impulse[3:])
 
     @classmethod
     def free(cls, payload_mass_kg: float, payload_com_t: Array) -> "Reaction":

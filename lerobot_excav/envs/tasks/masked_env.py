@@ -16,8 +16,9 @@ from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import TASKS, task_spec
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
-from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
 from lerobot_excav.envs.tasks.task import OBS_TYPES
+from lerobot_excav.envs.tasks.watched import WatchedEnv
 from lerobot_excav.errors import ConfigurationError, require_choice
 
 RENDER_MODES = ("rgb_array", None)
@@ -29,7 +30,7 @@ MASK_MISSING_LIMIT_S = 10.0
 """How long a machine is held still while its mask source finds nothing [s]; then the episode is over (kind: guess)."""
 
 
-class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[Any]]):
+class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any], NDArray[Any]]):
     """A machine in a scene, and a target that a mask of the main view commands.
 
     A task is a subclass that says how a scene begins, how a frame passes, what the targets are and what is measured.
@@ -47,6 +48,9 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         task: Id of the task; that of the class by default.
         obs_type: One of `OBS_TYPES`.
         render_mode: `rgb_array` or None.
+        render_height: Of `RenderSettings`, as are the next two: pictures for people, apart from what policies see.
+        render_width: See there.
+        render_camera: See there; one of the task's `views`.
         depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
         settings: Fields of the task's `TaskSettings`, by name.
 
@@ -64,6 +68,9 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         task: str | None = None,
         obs_type: str = "pixels_agent_pos",
         render_mode: str | None = "rgb_array",
+        render_height: int = RenderSettings.render_height,
+        render_width: int = RenderSettings.render_width,
+        render_camera: str = RenderSettings.render_camera,
         depth_info: bool = False,
         **settings: Any,
     ) -> None:
@@ -72,6 +79,10 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         self.settings = spec.make_settings(**settings)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("render_mode", render_mode, RENDER_MODES)
+        self.render_settings = RenderSettings(
+            render_height=render_height, render_width=render_width, render_camera=render_camera
+        )
+        require_choice("render_camera", render_camera, spec.views)
         self.task, self.task_description = spec.id, spec.description
         self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
         self.fps = self.settings.fps
@@ -189,6 +200,11 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         return tuple(self._commands)
 
     @property
+    def time_s(self) -> float:
+        """Simulated time since the start of the episode [s]."""
+        return (self._frame + self._missing_frames) / self.fps
+
+    @property
     def scene_id(self) -> int:
         """Scene of the running episode."""
         return self._require_episode().scene_id
@@ -215,7 +231,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
-        self._commands, self._main_img = [], None
+        self._commands, self._main_img, self._is_over = [], None, False
         self._give_command(selection.target_id)
         self._wait_for_mask()
         return self._observe(), self._info(is_over=False)
@@ -238,15 +254,13 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
                 reward += held_reward
         frames = self._frame + self._missing_frames
         truncated = (self.mask_missing or frames >= self.episode_length) and not terminated
-        info = self._info(is_over=terminated or truncated)
+        self._is_over = terminated or truncated
+        info = self._info(is_over=self._is_over)
         return self._observe(), float(reward), terminated, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the main view (H, W, 3) uint8 as it is, or None without a render mode."""
-        return None if self.render_mode is None else self.picture()
-
     def close(self) -> None:
-        """Free the graphics context."""
+        """Free the graphics contexts."""
+        self._close_view()
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = self._main_img = None
@@ -264,7 +278,7 @@ class MaskedTaskEnv[World, Picture: Renderer](gym.Env[dict[str, Any], NDArray[An
         return SCENE_SETS.index(self.settings.scene_set), self.scene_id
 
     def picture(self) -> NDArray[np.uint8]:
-        """Return the main picture, (H, W, 3) uint8; drawn once per frame, for LeRobot's videos ask for it again."""
+        """Return the main picture, (H, W, 3) uint8; drawn once per frame, for mask sources ask for it again."""
         if self._main_img is None:
             self._main_img = self.renderer.render("main")
         return self._main_img.copy()

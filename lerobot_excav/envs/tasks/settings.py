@@ -20,6 +20,30 @@ _LEAST_IMAGE_PX, _MOST_IMAGE_PX = 32, 1024  # below, a target covers hardly a pi
 
 
 @dataclass(kw_only=True)
+class RenderSettings:
+    """What `render()` of an environment returns: pictures for people, so LeRobot's videos of evaluations.
+
+    Apart from the settings of a task, because only environments have it: robots and recordings show what policies see.
+
+    Raises:
+        ConfigurationError: A field has a value that is not possible.
+    """
+
+    render_height: int = setting(
+        "Height of the pictures that people see [px]", default=480, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
+    )
+    render_width: int = setting(
+        "Width of the pictures that people see [px]", default=640, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
+    )
+    render_camera: str = setting(
+        "Camera of these pictures; which ones there are stands on the page of the environment", default="overview"
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+@dataclass(kw_only=True)
 class TaskSettings:
     """Everything that a user may set about a task, whether an environment, a robot or a recording plays it.
 
@@ -45,10 +69,10 @@ class TaskSettings:
         high=ENDLESS_FRAMES,
     )
     observation_height: int = setting(
-        "Height of every picture [px]", default=96, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
+        "Height of every picture that a policy sees [px]", default=96, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
     )
     observation_width: int = setting(
-        "Width of every picture [px]", default=128, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
+        "Width of every picture that a policy sees [px]", default=128, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX
     )
     scene_set: str = setting(
         "Stream of scenes; they share none, and reports are made of test", default="train", choices=SCENE_SETS
@@ -94,14 +118,19 @@ class TaskSettings:
     @property
     def mask_words(self) -> str:
         """What the mask shows, in words; datasets keep it as `excav.mask_source`."""
-        words = [self.mask_source]
-        if self.mask_condition != "correct":
-            words.append(self.mask_condition)
-        if self.mask_noise != "none":
-            words.append(f"{self.mask_noise} {self.mask_noise_px} px")
-        if self.target_overlay:
-            words.append("as overlay")
+        words = (self.mask_source, *self._mask_errors, *(("as overlay",) if self.target_overlay else ()))
         return ", ".join(words)
+
+    @property
+    def mask_faults(self) -> tuple[str, ...]:
+        """What is wrong with the mask on purpose, in words."""
+        return tuple(f"mask: {error}" for error in self._mask_errors)
+
+    @property
+    def _mask_errors(self) -> tuple[str, ...]:
+        condition = () if self.mask_condition == "correct" else (self.mask_condition,)
+        noise = () if self.mask_noise == "none" else (f"{self.mask_noise} {self.mask_noise_px} px",)
+        return (*condition, *noise)
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class TaskSpec:
         robot_type: `--robot.type` of its simulated robot, and `robot_type` of its datasets.
         description: What is to be done, in a sentence; the task of LeRobot's datasets.
         cameras: Names of the pictures: `main`, which the mask belongs to, others, and `target_mask`.
+        views: Names of the cameras that people may look through, `overview` among them.
         state_names: Elements of `agent_pos` and `observation.state`; each ends in `.pos` or `.vel`.
         action_names: Elements of an action.
         action_low: Least value of each.
@@ -66,6 +67,7 @@ class TaskSpec:
     robot_type: str
     description: str
     cameras: tuple[str, ...]
+    views: tuple[str, ...]
     state_names: tuple[str, ...]
     action_names: tuple[str, ...]
     action_low: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Rollouts side by side: the videos of `lerobot-eval` as tiles of one small video, the mask tinted."""
+"""Rollouts side by side: the videos of `lerobot-eval`, in which the target is marked, as tiles of one small video."""
 
 import logging
 import math
@@ -9,13 +9,11 @@ from pathlib import Path
 
 import av
 import numpy as np
-from numpy.typing import NDArray
+import PIL.Image
 
 from lerobot_excav.datasets.format.reading import reading
-from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.tasks.measures import EpisodeRecord
 from lerobot_excav.errors import DatasetError
-from lerobot_excav.evaluation.result_page.clip_mask import ShownMask, shown_masks
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
 from lerobot_excav.evaluation.video import Image, write_video
@@ -35,10 +33,9 @@ _QUALITIES = (26, 30, 34, 38, 42)  # constant rate factors of x264, from good to
 
 @dataclass(frozen=True, kw_only=True)
 class Clip:
-    """A tile of the grid: the video of an episode, the masks to draw into it, the record that colours its border."""
+    """A tile of the grid: the video of an episode, and the record that colours its border."""
 
     path: Path
-    masks: Sequence[ShownMask]
     episode: EpisodeRecord
 
 
@@ -46,8 +43,7 @@ def grid_clips(page: ResultPage) -> list[list[Clip]]:
     """Return the clips of a page whose videos are there, row by row.
 
     Raises:
-        DatasetError: A video is damaged, or of an episode that was not played.
-        RenderingError: Pictures cannot be made on this machine.
+        DatasetError: A video is of an episode that was not played.
     """
     rows = {row.row.label: row for row in page.rows}
     return [[_clip(rows[clips.label], n) for n in clips.episodes] for clips in present_clips(page)]
@@ -74,16 +70,13 @@ def _video(row: PageRow, number: int) -> Path:
 
 def _clip(row: PageRow, number: int) -> Clip:
     # In the order in which they were played, as the videos are numbered.
-    played = list(row.run.first.episodes.items())
+    played = list(row.run.first.episodes.values())
     if number >= len(played):
         raise DatasetError(
             f"clips of {row.row.label!r}: episode {number} was not played; {row.run.first.path} has episodes 0 to "
             f"{len(played) - 1}"
         )
-    key, episode = played[number]
-    height, width = next(read_video(_video(row, number))).shape[:2]
-    masks = shown_masks(row.run, key, height=height, width=width)
-    return Clip(path=_video(row, number), masks=masks, episode=episode)
+    return Clip(path=_video(row, number), episode=played[number])
 
 
 def read_video(path: Path) -> Iterator[Image]:
@@ -130,7 +123,7 @@ def _band(tiles: Sequence[Image], width: int) -> Image:
 
 
 def _tiles(clip: Clip) -> list[Image]:
-    """Return the pictures of a clip at the grid's size and rate, tinted and framed."""
+    """Return the pictures of a clip at the grid's size and rate, framed."""
     ticks_per_frame = FRAMES_PER_SECOND / _rate(clip.path)
     colour = _border_rgb(clip.episode)
     tiles: list[Image] = []
@@ -138,8 +131,7 @@ def _tiles(clip: Clip) -> list[Image]:
         # A frame is seen at the grid's ticks until the next one begins: at several, or at none.
         ticks = math.ceil((number + 1) * ticks_per_frame) - len(tiles)
         if ticks:
-            tile = framed(tinted(enlarged(image), enlarged(_mask_at(clip.masks, number))), colour)
-            tiles += ticks * [tile]
+            tiles += ticks * [framed(resized(image), colour)]
     return tiles
 
 
@@ -154,14 +146,12 @@ def _rate(path: Path) -> Fraction:
         return Fraction(container.streams.video[0].average_rate)
 
 
-def _mask_at(masks: Sequence[ShownMask], frame: int) -> NDArray[np.bool_]:
-    return [mask.pixels for mask in masks if mask.since <= frame][-1]
-
-
-def enlarged[Pixels: (NDArray[np.uint8], NDArray[np.bool_])](image: Pixels) -> Pixels:
-    """Return a picture or mask with every pixel repeated until it is about as high as a tile."""
-    times = max(1, round(_TILE_HEIGHT / image.shape[0]))
-    return image.repeat(times, axis=0).repeat(times, axis=1)
+def resized(image: Image) -> Image:
+    """Return a picture as high as a tile, in its own proportions; a small one keeps its sharp pixels."""
+    height, width = image.shape[:2]
+    size = (2 * round(0.5 * width * _TILE_HEIGHT / height), _TILE_HEIGHT)  # codecs want even numbers
+    method = PIL.Image.Resampling.NEAREST if height < _TILE_HEIGHT else PIL.Image.Resampling.LANCZOS
+    return np.array(PIL.Image.fromarray(image).resize(size, method))
 
 
 def framed(image: Image, colour: tuple[int, int, int]) -> Image:

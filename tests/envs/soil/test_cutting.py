@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.soil import BUCKET, rotation_at
-from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, crossed_face, cut
+from lerobot_excav.envs.soil.cutting import ALREADY_INSIDE, column_interval, column_line, crossed_face, cut
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Intake
 from validation.soil.reference import bucket as reference
@@ -29,7 +29,8 @@ def pose(edge, turned):
 
 def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
-    window = field.window(now.place(BUCKET.corners_t))
+    low, high = now.place(BUCKET.corners_t).min(axis=0), now.place(BUCKET.corners_t).max(axis=0)
+    window = field.window(np.stack([low - 0.5 * CELL, high + 0.5 * CELL]))
     return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, intake.bins)
 
 
@@ -80,11 +81,10 @@ def test_every_cut_keeps_the_volume_and_leaves_the_bucket_clear(angles, edge, st
     assert field.volume_m3 + entered + lost == pytest.approx(volume, abs=1e-12)
     assert 0.0 <= entered <= room
     assert (field.heights >= 0.0).all()
-    for i, x in enumerate(field.centres(0)):
-        for j, y in enumerate(field.centres(1)):
-            low, high, _ = column_interval(PLANES, now.position, turned, x, y)
-            if low < high and high >= 0.5:  # no soil above the bucket that could have fallen in
-                assert field.heights[i, j] <= max(low, 0.0) + 1e-9
+    for i, j in np.ndindex(field.heights.shape):
+        low, high, _ = column_interval(PLANES, now.position, turned, *column_line(field.grid, i, j))
+        if low < high and high >= 0.5:  # no soil above the bucket that could have fallen in
+            assert field.heights[i, j] <= max(low, 0.0) + 1e-9
 
 
 def test_soil_before_the_opening_enters_and_more_bins_see_a_thinner_layer():
@@ -114,7 +114,7 @@ def test_what_cannot_enter_piles_up_on_the_side_to_which_the_bucket_moves(pitch_
         pass  # soil above the opening falls in
     heights = field.heights.copy()
     entered, _ = move(field, before, now, room)
-    grown = field.centres(axis)[np.argwhere(field.heights > heights + 1e-12)[:, axis]]
+    grown = np.array([column_line(field.grid, *ij)[axis] for ij in np.argwhere(field.heights > heights + 1e-12)])
     assert entered == pytest.approx(0.0, abs=1e-12)
     assert len(grown) > 0
     assert grown.max() < -0.05 if least is None else grown.min() > least

@@ -117,6 +117,6 @@ def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while(offset):
 def test_cohesion_draws_no_crumb_through_the_ground(mass_kg):
     soil = Soil("wet_sand")
     soil.reset(np.full((120, 120), 0.3))
-    soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]))
+    soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]), apart=False)
     fall(soil, 3.0)
     assert soil.airborne_mass_kg == 0.0

@@ -107,11 +107,14 @@ def test_an_overlay_tints_the_mask_as_shown_into_the_main_view_alone(condition):
 
 
 def test_the_overlay_shows_noise_and_leaves_what_people_see():
-    env = ReachEnv(target_overlay=True, mask_noise="shift", mask_noise_px=5)
+    settings = {"mask_noise": "shift", "mask_noise_px": 5}
+    env, plain = ReachEnv(target_overlay=True, **settings), ReachEnv(**settings)
     observation, _ = env.reset(seed=6)
+    plain.reset(seed=6)
     noisy = masks_of(observation)[..., 0] > 0
     assert not np.array_equal(noisy, true_masks(env)[2])
-    assert np.array_equal(observation["pixels"]["main"], tinted(env.render(), noisy))
+    assert np.array_equal(observation["pixels"]["main"], tinted(env.picture(), noisy))
+    assert np.array_equal(env.render(), plain.render())
 
 
 def test_depth_is_registered_with_the_main_view():

@@ -65,9 +65,11 @@ def write_evaluation(metrics_file, tmp_path):
     return write
 
 
-def write_clip(path, frames=20, rate=50):
+def write_clip(path, frames=20, rate=50, height=24, width=32):
     """Write a video that brightens by 5 a frame."""
-    write_video(path, [np.full((24, 32, 3), 5 * number, dtype=np.uint8) for number in range(frames)], rate, crf=23)
+    write_video(
+        path, [np.full((height, width, 3), 5 * number, dtype=np.uint8) for number in range(frames)], rate, crf=23
+    )
 
 
 @pytest.fixture

@@ -1,24 +1,15 @@
 import json
 import shutil
 
-import numpy as np
 import pytest
 
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.evaluation.result_page import video_grid
-from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
 from lerobot_excav.evaluation.result_page.page import make_page
 from lerobot_excav.evaluation.result_page.page_files import write_page
 from lerobot_excav.evaluation.result_page.page_text import page_text
 
 from .conftest import contents
-
-
-@pytest.fixture(autouse=True)
-def masks(monkeypatch):
-    """Masks without a simulation."""
-    mask = ShownMask(since=0, pixels=np.zeros((24, 32), dtype=bool))
-    monkeypatch.setattr(video_grid, "shown_masks", lambda *_, **__: [mask])
 
 
 @pytest.fixture

@@ -1,8 +1,6 @@
-import numpy as np
 import pytest
 
 from lerobot_excav.evaluation.result_page import video_grid
-from lerobot_excav.evaluation.result_page.clip_mask import ShownMask
 from lerobot_excav.evaluation.result_page.video_grid import Clip, read_video, write_grid
 
 from .conftest import write_clip
@@ -10,15 +8,11 @@ from .conftest import write_clip
 
 @pytest.fixture
 def clip(tmp_path, make_run, grasp_line):
-    def make(name, *, outcome=None, frames=20, rate=50, marked=(slice(0), slice(0)), since=0):
+    def make(name, *, outcome=None, frames=20, rate=50, **size):
         path = tmp_path / f"{name}.mp4"
-        write_clip(path, frames=frames, rate=rate)
-        nothing = np.zeros((24, 32), dtype=bool)
-        pixels = nothing.copy()
-        pixels[marked] = True
-        masks = [ShownMask(since=0, pixels=nothing), ShownMask(since=since, pixels=pixels)]
+        write_clip(path, frames=frames, rate=rate, **size)
         (episode,) = make_run(name, [grasp_line(0, **(outcome or {}))]).episodes
-        return Clip(path=path, masks=masks, episode=episode)
+        return Clip(path=path, episode=episode)
 
     return make
 
@@ -55,16 +49,12 @@ def test_the_border_tells_success_and_obedience_to_a_wrong_mask(clip, tmp_path):
         assert picture[100, 256 * number + 1] == pytest.approx(colour, abs=25)
 
 
-def test_a_mask_is_tinted_from_its_first_frame_on(clip, tmp_path):
-    marked = (slice(8, 16), slice(8, 24))
-    write_grid(tmp_path / "grid.mp4", [[clip("a", marked=marked, since=10)]])
-    pictures = [picture.astype(int) for picture in read_video(tmp_path / "grid.mp4")]
-    redness = [picture[96, 128, 0] - picture[96, 128, 2] for picture in pictures]
-    assert max(redness[:4]) < 20
-    assert min(redness[6:]) > 40
-    outline = [picture[60:68, 128].max() for picture in pictures]  # the mask begins at row 64
-    assert max(outline[:4]) < 150
-    assert min(outline[6:]) > 200
+@pytest.mark.parametrize(("height", "width"), [(24, 32), (96, 128), (480, 640), (270, 480)])
+def test_clips_of_any_size_become_tiles_of_one_height(clip, tmp_path, height, width):
+    write_grid(tmp_path / "grid.mp4", [[clip("a", height=height, width=width)]])
+    shape = next(read_video(tmp_path / "grid.mp4")).shape
+    assert shape[0] == 192
+    assert shape[1] == pytest.approx(192 * width / height, abs=1.01)
 
 
 def test_a_grid_that_weighs_too_much_becomes_coarser(clip, tmp_path, monkeypatch, caplog):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
+from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.dynamics import LARGEST_SPEED_M_S, Laws
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.plates import ToolPath
@@ -32,8 +33,13 @@ def integrate(state: State, dt: float) -> None:
         state.positions[i] += dt * state.velocities[i]
 
 
-def advance(state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws, dt: float, steps: int) -> float:
-    """Advance all parcels by some sub-steps; return the fastest hit on a sleeping parcel [m/s]."""
+def advance(
+    state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws, dt: float, steps: int, pushes: Array
+) -> float:
+    """Advance all parcels by some sub-steps and add up the pushes on the load.
+
+    Returns the fastest hit on a sleeping parcel [m/s].
+    """
     hit = 0.0
     state.ground[:] = TOUCHES_NOTHING
     for step in range(steps):
@@ -41,9 +47,9 @@ def advance(state: State, memory: Memory, tool: ToolPath, site: Site, laws: Laws
         state.torques[:] = 0.0
         if tool.present:
             carry(state, tool, step)
-        hit = max(hit, press_pairs(state, memory, laws.parcel, dt))
+        hit = max(hit, press_pairs(state, memory, laws.parcel, dt, pushes))
         if tool.present:
-            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt)
+            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt, pushes)
         press_ground(state, site, laws.ground, dt)
         if site.box.half_x > 0.0:
             press_box(state, len(tool.profile) + 1, site.box, laws.steel, dt)

@@ -24,8 +24,8 @@ def neighbours(positions: Array, radii: Array, asleep: Flags) -> set[tuple[int, 
     }
 
 
-def press_pairs(state: State, memory: Memory, law: Law, dt: float) -> float:
-    """Add the forces of all touching pairs to a state; return the fastest hit on a sleeping parcel [m/s]."""
+def press_pairs(state: State, memory: Memory, law: Law, dt: float, pushes: Array) -> float:
+    """Add the forces of all touching pairs to a state, and what others give to the load to `pushes`; return the fastest hit on a sleeping parcel [m/s]."""
     hit = 0.0
     for i, j in combinations(range(len(state.masses)), 2):
         apart = state.positions[i] - state.positions[j]
@@ -47,6 +47,9 @@ def press_pairs(state: State, memory: Memory, law: Law, dt: float) -> float:
         radius = float(min(state.radii[i], state.radii[j]))
         springs = memory.setdefault((i, j), np.zeros(6))
         force, roll = contact(springs, normal, reach - distance, velocity, rolling, mass, radius, law, dt)
+        for own, other, sign, arm_w in ((i, j, 1.0, arm_i), (j, i, -1.0, arm_j)):
+            if state.load[own] and not state.load[other]:
+                pushes += np.concatenate([sign * force, np.cross(state.positions[own] + arm_w, sign * force)]) * dt
         state.forces[i] += force
         state.forces[j] -= force
         state.torques[i] += np.cross(arm_i, force) + arm * np.cross(normal, roll)

@@ -54,7 +54,9 @@ def nearest_point(polygon: Array, point: Array) -> Array:
     return np.asarray(on_sides[np.argmin(np.linalg.norm(on_sides - point, axis=1))])
 
 
-def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
+def press_bucket(
+    state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float, pushes: Array
+) -> None:
     """Add the forces of the bucket's plates on the awake parcels, and note where each is at the bucket."""
     origin, rotation = tool.positions[step], tool.rotations[step]
     polygons = bucket_polygons(tool)
@@ -71,7 +73,12 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
             nearest_t = nearest_point(polygon, point_t)
             surface_velocity = tool.linear + np.cross(tool.angular, rotation @ nearest_t)
             away = rotation @ (point_t - nearest_t)
+            before = state.velocities[i] + dt * state.forces[i] / state.masses[i]
             touches = _press(state, i, k, away, surface_velocity, law, dt)
+            if not state.load[i] and beyond[k + 1] <= 0.0:
+                gained = state.velocities[i] + dt * state.forces[i] / state.masses[i] - before
+                given = -state.masses[i] * gained
+                pushes += np.concatenate([given, np.cross(origin + rotation @ nearest_t, given)])
             state.near_plate[i] |= touches
             if touches and beyond[k + 1] > 0.0:
                 state.shell[i] = OUTSIDE_OF_SHELL

@@ -99,7 +99,7 @@ def run(state: State, steps: int, ground: Site | None = None, tool: ToolPath | N
     count = len(state.masses)
     new = np.full(count, -1, dtype=np.int64)
     world = (tool or no_tool(steps), ground or site(), laws)
-    return advance(state, room_for(count), room_for(count), new, *world, DT, steps)[2]
+    return advance(state, room_for(count), room_for(count), new, *world, DT, steps, np.zeros(6))[2]
 
 
 def assert_same(state: State, twin: State, *names: str) -> None:

@@ -9,12 +9,14 @@ Every point of a pile is seen from more than 40 degrees above the horizontal, st
 sand), so that no dig region hides behind the ridge.
 """
 
-OVERVIEW = CameraPose(position=(3.0, -6.5, 9.2), target=(-1.4, 1.1, 0.0), fovy_deg=52.0)
-"""Fixed to the world, from the same side but wider: machine, dig area and target box. For people, not policies."""
+OVERVIEW = CameraPose(position=(3.4, -8.2, 4.6), target=(-1.7, 0.9, 0.75), fovy_deg=44.0)
+"""Fixed to the world, from the same side but lower and wider: machine, dig area and target box, up to the horizon. For
+people, not policies."""
 
-CAB = CameraPose(position=(0.98, 0.75, 2.0), target=(4.8, -0.05, -0.7), fovy_deg=62.0)
-"""Fixed to the house (swing frame, origin on the slewing ring), on a bracket above the cab's windscreen: along the boom
-down to the dig area, and over the wall of the target box to the soil in it."""
+CAB = CameraPose(position=(0.95, 1.3, 2.0), target=(4.8, 0.6, -0.6), fovy_deg=62.0)
+"""Fixed to the house (swing frame, origin on the slewing ring), on a bracket left of the cab's windscreen, as a mirror
+is: past the boom, which covers 4 % of the picture over the operator's cycles, down to the dig area, and over the wall
+of the target box to the soil in it."""
 
 SIDE = CameraPose(position=(4.0, -4.6, 3.2), target=(4.4, 0.0, 0.0), fovy_deg=44.0)
 """Fixed to the house (swing frame): the bucket from the right, wherever it digs or dumps. For people, not policies."""

@@ -6,20 +6,23 @@ milliradians and a drift rate of zero. The reference never leads the joint by mo
 the servo saturates: like a relief valve, a stalled joint stays stalled without winding up.
 """
 
-from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lerobot_excav.envs.machines.excavator import constants as const
+from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.errors import ConfigurationError
 
+Array = NDArray[np.float64]
+
 # Position offset at which the stiffness balances the damping of a joint that moves at 1 rad/s.
-_VELOCITY_LEAD_S = tuple(
-    damping / stiffness
-    for damping, stiffness in zip(const.SERVO_DAMPING_NMS_RAD, const.SERVO_STIFFNESS_NM_RAD, strict=True)
-)
+_VELOCITY_LEAD_S = np.array(const.SERVO_DAMPING_NMS_RAD) / np.array(const.SERVO_STIFFNESS_NM_RAD)
+_LOWER_RAD, _UPPER_RAD = np.array(const.JOINT_RANGE_RAD).T.copy()
+_ACCEL_RAD_S2 = np.array(const.JOINT_ACCEL_RAD_S2)
+_SPEED_RAD_S = np.array(const.JOINT_SPEED_RAD_S)
+_DEFLECTION_RAD = float(const.SERVO_DEFLECTION_RAD)
 
 
 def checked_action(action: object) -> NDArray[np.float64]:
@@ -42,47 +45,49 @@ def checked_action(action: object) -> NDArray[np.float64]:
     return np.clip(array, -1.0, 1.0)
 
 
+@kernel
+def _clipped(value: float, lower: float, upper: float) -> float:
+    return min(max(value, lower), upper)
+
+
+@kernel
+def lead_reference(
+    reference_pos: Array, reference_vel: Array, set_points: Array, command: Array, joint_pos: Array, dt_s: float
+) -> None:
+    """Advance the reference by one substep; arguments as in `RateControl.step`, all (4,), the first three change."""
+    for joint in range(len(command)):
+        lower, upper, accel = _LOWER_RAD[joint], _UPPER_RAD[joint], _ACCEL_RAD_S2[joint]
+        pos, vel, measured = reference_pos[joint], reference_vel[joint], joint_pos[joint]
+        vel = _clipped(command[joint] * _SPEED_RAD_S[joint], vel - accel * dt_s, vel + accel * dt_s)
+        # Towards a joint limit: no faster than can still be stopped at the rated deceleration.
+        vel = _clipped(vel, -sqrt(2.0 * accel * max(pos - lower, 0.0)), sqrt(2.0 * accel * max(upper - pos, 0.0)))
+        pos = _clipped(pos + vel * dt_s, measured - _DEFLECTION_RAD, measured + _DEFLECTION_RAD)
+        pos = _clipped(pos, lower, upper)
+        reference_pos[joint], reference_vel[joint] = pos, vel
+        set_points[joint] = pos + vel * _VELOCITY_LEAD_S[joint]
+
+
 class RateControl:
     """Turn rate commands into the set points of the four position servos.
 
     Attributes:
-        reference_pos: Positions that the servos hold [rad], one per joint.
-        reference_vel: Their rates [rad/s].
+        reference_pos: Positions that the servos hold [rad], (4,).
+        reference_vel: Their rates [rad/s], (4,).
     """
 
     def __init__(self) -> None:
-        self.reference_pos = [0.0] * 4
-        self.reference_vel = [0.0] * 4
+        self.reference_pos: Array = np.zeros(4)
+        self.reference_vel: Array = np.zeros(4)
 
     def reset(self, joint_pos: ArrayLike) -> None:
         """Hold the given joint positions, shape (4,) [rad], at rest."""
-        self.reference_pos = np.asarray(joint_pos, dtype=np.float64).tolist()
-        self.reference_vel = [0.0] * 4
+        self.reference_pos[:] = joint_pos
+        self.reference_vel[:] = 0.0
 
-    def step(self, command: Sequence[float], joint_pos: Sequence[float], dt_s: float) -> list[float]:
+    def step(self, command: Array, joint_pos: Array, dt_s: float, set_points: Array) -> None:
         """Advance the reference by one substep, under rate commands in [-1, 1] at measured joint positions [rad].
 
-        Plain floats: four joints are too few for arrays to pay, and this runs in every substep.
-
-        Returns:
-            Set points of the servos [rad]: the reference plus a velocity lead that cancels the servo's damping.
+        Writes the set points of the servos [rad], (4,): the reference plus a velocity lead that cancels the servo's
+        damping.
         """
-        set_points = []
-        for joint in range(4):
-            lower, upper = const.JOINT_RANGE_RAD[joint]
-            accel, measured = const.JOINT_ACCEL_RAD_S2[joint], joint_pos[joint]
-            pos, vel = self.reference_pos[joint], self.reference_vel[joint]
-            wanted = command[joint] * const.JOINT_SPEED_RAD_S[joint]
-            vel = _clipped(wanted, vel - accel * dt_s, vel + accel * dt_s)
-            # Towards a joint limit: no faster than can still be stopped at the rated deceleration.
-            vel = _clipped(vel, -sqrt(2.0 * accel * max(pos - lower, 0.0)), sqrt(2.0 * accel * max(upper - pos, 0.0)))
-            lead = const.SERVO_DEFLECTION_RAD
-            pos = _clipped(pos + vel * dt_s, measured - lead, measured + lead)
-            pos = _clipped(pos, lower, upper)
-            self.reference_pos[joint], self.reference_vel[joint] = pos, vel
-            set_points.append(pos + vel * _VELOCITY_LEAD_S[joint])
-        return set_points
-
-
-def _clipped(value: float, lower: float, upper: float) -> float:
-    return min(max(value, lower), upper)
+        lead_reference(self.reference_pos, self.reference_vel, set_points, command, joint_pos, dt_s)

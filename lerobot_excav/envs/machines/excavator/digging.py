@@ -6,10 +6,70 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.braking import braking_impulse, patch_rows, solved
 from lerobot_excav.envs.machines.simulator import mujoco
-from lerobot_excav.envs.soil.patches import Patches, PatchKind
+from lerobot_excav.envs.soil.compiled import kernel
+from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.tool import Reaction
 
 Array = NDArray[np.float64]
+
+_SUBSTEP_S = const.SUBSTEP_S
+
+
+@kernel
+def free_velocity(
+    inertia: Array,
+    servo_forces: Array,
+    servo_limits: Array,
+    servo_inertia: Array,
+    joint_vel: Array,
+    passive: Array,
+    actuator: Array,
+    applied: Array,
+    bias: Array,
+    constraint: Array,
+) -> Array:
+    """Return the joint velocities at the end of a substep without soil, (n,) [rad/s].
+
+    The inertia (n, n) [kg m2] becomes the effective one, in place: a servo below its limit adds `servo_inertia`.
+    The other arguments are forces on the joints (n,) [N m], named as in `mujoco.MjData`.
+    """
+    forces = passive + actuator + applied - bias
+    for j in range(len(forces)):
+        forces[j] += constraint[j]
+        if abs(servo_forces[j]) < servo_limits[j]:
+            inertia[j, j] += servo_inertia[j]
+    return joint_vel + _SUBSTEP_S * solved(inertia, forces)
+
+
+@kernel
+def resisting_force(
+    jacobian: Array,
+    rotation: Array,
+    points_t: Array,
+    axes_t: Array,
+    limits: Array,
+    frictions: Array,
+    inertia: Array,
+    free_vel: Array,
+) -> tuple[Array, Array]:
+    """Return the force of the patches on the joints (n,) [N m] and on the bucket (3,) [N], in the world.
+
+    The rotation of the bucket is (9,), row by row; the other arguments are as in `patch_rows` and `braking_impulse`.
+    """
+    turn = rotation.reshape((3, 3))
+    rows = patch_rows(jacobian, turn, points_t, axes_t)
+    total, impulses = braking_impulse(rows, limits, frictions, inertia, free_vel)
+    push_t = np.zeros(3)
+    for k in range(len(impulses)):
+        for a in range(3):
+            for b in range(3):
+                push_t[b] += impulses[k, a] * axes_t[k, a, b]
+    force_w = np.zeros(3)
+    for a in range(3):
+        for b in range(3):
+            force_w[a] += turn[a, b] * push_t[b]
+        force_w[a] /= _SUBSTEP_S
+    return total / _SUBSTEP_S, force_w
 
 
 class JointResistance:
@@ -28,9 +88,11 @@ class JointResistance:
         self._bucket = model.body("bucket").id
         self._added_inertia = const.SUBSTEP_S * np.array(const.SERVO_DAMPING_NMS_RAD)
         self._torque_limit = np.array(const.JOINT_TORQUE_NM)
-        self._units = np.eye(model.nv)
         self._jacobian = np.zeros((6, model.nv))
+        self._halves = self._jacobian[:3], self._jacobian[3:]
         self._inertia = np.zeros((model.nv, model.nv))
+        self._columns = list(zip(self._inertia, np.eye(model.nv), strict=True))
+        self._no_force = np.zeros(model.nv)
         self.reset()
 
     def reset(self) -> None:
@@ -45,26 +107,26 @@ class JointResistance:
         The ground cannot push plates and edge harder than the machine weighs.
         """
         patches = reaction.patches.bounded(const.MACHINE_WEIGHT_N, PatchKind.PRESSURE, PatchKind.PENETRATION)
+        self._limits = const.SUBSTEP_S * patches.limits_n
+        if len(patches) == 0:
+            return
         rotation = data.xmat[self._bucket].reshape(3, 3)
         self._points_t = (patches.points_w - data.xpos[self._bucket]) @ rotation
-        self._axes_t = _axes(patches) @ rotation
-        self._limits = const.SUBSTEP_S * patches.limits_n
+        self._axes_t = patch_axes(patches.normals_w) @ rotation
         self._frictions = patches.frictions
 
     def apply(self, data: mujoco.MjData) -> None:
         """Add the resistance of this substep to `qfrc_applied`; call it between `mj_step1` and `mj_step2`."""
         if len(self._limits) == 0:
-            self._joint_force[:] = 0.0
+            self._joint_force = self._no_force
             self.force_w_n = np.zeros(3)
             return
-        mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._bucket)
-        rotation = data.xmat[self._bucket].reshape(3, 3)
-        rows = patch_rows(self._jacobian, rotation, self._points_t, self._axes_t)
+        mujoco.mj_jacBody(self._model, data, *self._halves, self._bucket)
         inertia, free_vel = self._free_motion(data)
-        total, impulses = braking_impulse(rows, self._limits, self._frictions, inertia, free_vel)
-        self._joint_force = total / const.SUBSTEP_S
+        patches = self._points_t, self._axes_t, self._limits, self._frictions
+        rotation = data.xmat[self._bucket]
+        self._joint_force, self.force_w_n = resisting_force(self._jacobian, rotation, *patches, inertia, free_vel)
         data.qfrc_applied[:] += self._joint_force
-        self.force_w_n = rotation @ np.einsum("ka,kab->b", impulses, self._axes_t) / const.SUBSTEP_S
 
     def _free_motion(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Return the effective inertia of the joints and their velocities at the end of the substep without soil.
@@ -72,14 +134,13 @@ class JointResistance:
         The inertia is M + dt D: integrated implicitly, a servo's damping acts like inertia, unless it is saturated.
         """
         mujoco.mj_fwdActuation(self._model, data)
-        forces = data.qfrc_passive + data.qfrc_actuator + data.qfrc_applied - data.qfrc_bias
-        if data.nefc:
-            forces += self._constraint_force(data)
-        for row, unit in zip(self._inertia, self._units, strict=True):
-            mujoco.mj_mulM(self._model, data, row, unit)
-        is_free = np.abs(data.actuator_force) < self._torque_limit
-        self._inertia.flat[:: self._model.nv + 1] += is_free * self._added_inertia
-        return self._inertia, data.qvel + const.SUBSTEP_S * solved(self._inertia, forces)
+        applied = data.qfrc_applied.copy()
+        constraint = self._constraint_force(data) if data.nefc else self._no_force
+        for column, unit in self._columns:
+            mujoco.mj_mulM(self._model, data, column, unit)
+        servos = data.actuator_force, self._torque_limit, self._added_inertia
+        forces = data.qfrc_passive, data.qfrc_actuator, applied, data.qfrc_bias
+        return self._inertia, free_velocity(self._inertia, *servos, data.qvel, *forces, constraint)
 
     def _constraint_force(self, data: mujoco.MjData) -> Array:
         """Return the force of contacts and joint limits on the joints while the soil resists as it did before.
@@ -93,11 +154,22 @@ class JointResistance:
         return np.array(data.qfrc_constraint)
 
 
-def _axes(patches: Patches) -> Array:
-    """Return (k, 3, 3): the normal and two tangents of each patch as rows, in the world."""
-    normals = patches.normals_w
-    # The world axis that leans least to the normal gives the first tangent.
-    helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+@kernel
+def patch_axes(normals: Array) -> Array:
+    """Return (k, 3, 3): the normals (k, 3) and two tangents of each patch as rows."""
+    axes = np.zeros((len(normals), 3, 3))
+    for k in range(len(normals)):
+        normal, first, second = normals[k], axes[k, 1], axes[k, 2]
+        # The world axis that leans least to the normal gives the first tangent.
+        least = np.argmin(np.abs(normal))
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            axes[k, 0, a] = normal[a]
+            first[a] = normal[b] * (1.0 if c == least else 0.0) - normal[c] * (1.0 if b == least else 0.0)
+        length = np.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
+        for a in range(3):
+            first[a] /= length
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            second[a] = normal[b] * first[c] - normal[c] * first[b]
+    return axes

@@ -12,3 +12,6 @@ STATE_NAMES = (*(f"{joint}.pos" for joint in JOINT_NAMES), *ACTION_NAMES)
 """Joint positions [rad] and velocities [rad/s], in the order of `agent_pos`."""
 
 CAMERAS = ("main", "cab", "target_mask")
+
+VIEWS = ("overview", "side", "main", "cab")
+"""Cameras that people may look through."""

@@ -61,13 +61,22 @@ class Grains:
         self._vertices = block.reshape(MOST_PARCELS, _VERTICES, 3)
         self._shapes = _draw_shapes(np.random.default_rng(_LOOK_SEED)).astype(np.float32)
 
-    def show(self, positions_w: NDArray[np.float64], radii_m: NDArray[np.float64]) -> None:
-        """Show the parcels with these centres (n, 3) and radii (n,) [m], the first `MOST_PARCELS`, and no others."""
+    def show(
+        self,
+        positions_w: NDArray[np.float64],
+        radii_m: NDArray[np.float64],
+        shapes: NDArray[np.intp] | None = None,
+    ) -> None:
+        """Show parcels with these centres (n, 3) and radii (n,) [m], the first `MOST_PARCELS`, and no others.
+
+        Numbers (n,) say which shape each has; by default its own place in the row.
+        """
         count = min(len(positions_w), MOST_PARCELS)
         skins = -(-count // PARCELS_PER_SKIN)
         centres = positions_w[:count].astype(np.float32)
         radii = radii_m[:count].astype(np.float32)
-        self._vertices[:count] = centres[:, None] + radii[:, None, None] * self._shapes[:count]
+        own = self._shapes[:count] if shapes is None else self._shapes[shapes[:count] % MOST_PARCELS]
+        self._vertices[:count] = centres[:, None] + radii[:, None, None] * own
         if count:  # the rest of the last skin shrinks into a point
             self._vertices[count : skins * PARCELS_PER_SKIN] = centres[-1]
         for number, skin in enumerate(self._skins):

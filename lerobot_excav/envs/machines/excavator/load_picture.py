@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator import surfaces
 from lerobot_excav.envs.machines.excavator.bodywork import HIDDEN_GROUP, LOOSE_SOIL_GROUP
+from lerobot_excav.envs.machines.excavator.interpolation import smooth
 from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.plates import PLATE_THICKNESS_M
 
@@ -19,7 +20,6 @@ _SPACING_M = 0.06
 # In radii of a parcel (kind: tuned by eye).
 _REACH = 1.5
 _SINK = 0.3
-_KERNEL = np.array([0.25, 0.5, 0.25])
 
 
 def add_load(spec: mujoco.MjSpec) -> None:
@@ -51,7 +51,7 @@ class LoadPicture:
         self._model.skin_group[self._skin] = LOOSE_SOIL_GROUP if len(places_t) else HIDDEN_GROUP
         if len(places_t) == 0:
             return np.zeros(0, dtype=bool)
-        surface = np.minimum(_smooth(self._tops(places_t, radii_m)) + _SINK * radii_m.mean(), self._shell)
+        surface = np.minimum(smooth(self._tops(places_t, radii_m)) + _SINK * radii_m.mean(), self._shell)
         vertices = surfaces.skin_vertices(self._grid, surface, foot_m=self._shell)
         surfaces.write_skin(self._model, LOAD_SKIN, vertices)
         i, j = self._nearest(places_t)
@@ -86,10 +86,3 @@ def _shell_depth(x_t: NDArray[np.float64]) -> NDArray[np.float64]:
     bottom = profile[: int(np.argmin(profile[:, 0]))]
     depth = np.interp(x_t, bottom[::-1, 0], bottom[::-1, 1])
     return np.asarray(depth + 0.5 * PLATE_THICKNESS_M)
-
-
-def _smooth(heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return heights (nx, ny) averaged with those of their neighbours."""
-    padded = np.pad(heights, 1, mode="edge")
-    rows = sum(w * padded[k : k + heights.shape[0]] for k, w in enumerate(_KERNEL))
-    return np.asarray(sum(w * rows[:, k : k + heights.shape[1]] for k, w in enumerate(_KERNEL)))

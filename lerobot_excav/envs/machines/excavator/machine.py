@@ -8,6 +8,7 @@ from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.bucket import bucket_geometry
 from lerobot_excav.envs.machines.excavator.control import RateControl, checked_action
 from lerobot_excav.envs.machines.excavator.digging import JointResistance
+from lerobot_excav.envs.machines.excavator.impact import SoilImpact
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.machines.excavator.mjcf import build_spec
 from lerobot_excav.envs.machines.excavator.payload import Payload
@@ -38,9 +39,11 @@ class ExcavatorMachine:
         self.container = container
         self.model = build_spec(container).compile()
         self.data = mujoco.MjData(self.model)
+        self._troubles = [self.data.warning[kind] for kind in _DIVERGENCE]
         self._control = RateControl()
         self._resistance = JointResistance(self.model)
         self._payload = Payload(self.model)
+        self._impact = SoilImpact(self.model)
         self._geometry = bucket_geometry()
         self._bucket = self.model.body("bucket").id
         self._edge_site = self.model.site("cutting_edge").id
@@ -77,19 +80,21 @@ class ExcavatorMachine:
             ConfigurationError: The action has the wrong shape or a value that is not finite.
             ExcavError: The simulation diverged.
         """
-        command = checked_action(action).tolist()
-        model, data = self.model, self.data
+        command, model, data = checked_action(action), self.model, self.data
+        joint_pos, set_points, applied = data.qpos, data.ctrl, data.qfrc_applied
         self._resistance.set_reaction(reaction, data)
         self.box_contact_force_n = 0.0
         for remaining in range(SUBSTEPS, 0, -1):
             self._payload.approach(reaction.payload_mass_kg, reaction.payload_com_t, remaining)
-            data.ctrl[:] = self._control.step(command, data.qpos.tolist(), const.SUBSTEP_S)
+            self._control.step(command, joint_pos, const.SUBSTEP_S, set_points)
             mujoco.mj_step1(model, data)
-            data.qfrc_applied[:] = 0.0
+            applied[:] = 0.0
             self._payload.apply_momentum(data)
+            self._impact.apply(data, reaction)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)
-            self.box_contact_force_n = max(self.box_contact_force_n, self._box_force_now_n())
+            if data.ncon:
+                self.box_contact_force_n = max(self.box_contact_force_n, self._box_force_now_n())
         # Step 2 leaves poses and velocities of bodies at the start of the substep: bring them up to date.
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -140,27 +145,24 @@ class ExcavatorMachine:
         """Return the bucket as the soil sees it: geometry, pose and velocity now."""
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self._bucket, velocity, 0)
-        return Tool(
-            geometry=self._geometry,
+        return Tool.of_machine(
+            self._geometry,
+            np.array(self.data.xmat[self._bucket]).reshape(3, 3),
             position_w=np.array(self.data.xpos[self._bucket]),
-            rotation_w=np.array(self.data.xmat[self._bucket]).reshape(3, 3),
             linear_velocity_w=velocity[3:],
             angular_velocity_w=velocity[:3],
         )
 
     def _box_force_now_n(self) -> float:
         """Sum of the normal forces of all contacts with the target box [N]."""
-        contact = self.data.contact
-        if len(contact) == 0:
-            return 0.0
         force, total = np.zeros(6), 0.0
-        for i in np.flatnonzero(self._is_box_geom[contact.geom].any(axis=1)):
+        for i in np.flatnonzero(self._is_box_geom[self.data.contact.geom].any(axis=1)):
             mujoco.mj_contactForce(self.model, self.data, i, force)
             total += force[0]
         return total
 
     def _check_finite(self) -> None:
-        if any(self.data.warning[w].number for w in _DIVERGENCE):
+        if any(trouble.number for trouble in self._troubles):
             raise ExcavError(
                 f"the machine diverged at t={self.data.time:.3f} s with qpos={self.data.qpos.tolist()}; "
                 "please report the actions that led there"

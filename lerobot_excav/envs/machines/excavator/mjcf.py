@@ -19,8 +19,14 @@ _AXIS_UP = (0.0, 0.0, 1.0)
 _AXIS_RIGHT = (0.0, -1.0, 0.0)  # turns x towards z: positive angles lift
 
 
-def build_spec(container: Container = TARGET_BOX) -> mujoco.MjSpec:
+def build_spec(
+    container: Container = TARGET_BOX, *, terrain_spacing_m: float = surfaces.POLICY_SPACING_M
+) -> mujoco.MjSpec:
     """Assemble the model, with a target box; the world frame is that of the soil.
+
+    Args:
+        container: The box.
+        terrain_spacing_m: Between the vertices of the skin `terrain` [m].
 
     Returns:
         A spec with the joints and actuators of `constants.JOINT_NAMES`, in that order, the bodies
@@ -34,7 +40,7 @@ def build_spec(container: Container = TARGET_BOX) -> mujoco.MjSpec:
     _add_ground(spec)
     _add_box(spec, container)
     _add_machine(spec)
-    surfaces.add_soil(spec, container)
+    surfaces.add_soil(spec, container, spacing_m=terrain_spacing_m)
     add_load(spec)
     add_grains(spec)
     return spec

@@ -32,7 +32,7 @@ class WorksiteRenderer:
     def __init__(self, worksite: Worksite, *, height: int, width: int) -> None:
         self._worksite = worksite
         machine = worksite.machine
-        self._soil_picture = SoilPicture(machine)
+        self._soil_picture = SoilPicture(machine.model, machine)
         self._pictures = CameraPictures(
             machine.model, machine.data, cameras=CAMERAS, height=height, width=width, max_geoms=_MAX_GEOMS
         )
@@ -41,12 +41,12 @@ class WorksiteRenderer:
 
     def render(self, camera: str) -> NDArray[np.uint8]:
         """Return the colour picture (H, W, 3), uint8, of one of `CAMERAS`."""
-        self._soil_picture.update(self._worksite.soil)
+        self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
         return self._pictures.colour(camera, self._all)
 
     def depth_m(self, camera: str) -> NDArray[np.float32]:
         """Return the distance along the optical axis (H, W) [m], float32; the far plane where nothing is."""
-        self._soil_picture.update(self._worksite.soil)
+        self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
         return self._pictures.distance_m(camera, self._all).astype(np.float32)
 
     def camera(self, camera: str) -> PinholeCamera:
@@ -58,7 +58,7 @@ class WorksiteRenderer:
 
         It is NaN where the pixel shows no soil of the dig area.
         """
-        self._soil_picture.update(self._worksite.soil)
+        self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
         points_w = self._pictures.points_w("main", self._without_machine)
         half_x, half_y = 0.5 * np.asarray(DIG_AREA_EXTENT_M)
         inside = (np.abs(points_w[..., 0]) <= half_x) & (np.abs(points_w[..., 1]) <= half_y)

@@ -15,7 +15,9 @@ from lerobot_excav.envs.soil.container import Container
 
 TERRAIN_SKIN = "terrain"
 BOX_SOIL_SKIN = "box_soil"
-_SPACING_M = 0.1
+POLICY_SPACING_M = 0.1
+"""Between the vertices of the terrain in pictures for policies [m]: finer is slower, and a pixel is as wide."""
+_BOX_SPACING_M = 0.05
 _SKIRT_DEPTH_M = 0.05
 _GRAIN_GLOW = 0.25  # tuned by eye
 _TEXTURE_PIXELS = 128
@@ -23,22 +25,22 @@ _TEXTURE_PERIOD_M = 2.0
 _TEXTURE_SEED = 7  # a picture, not an experiment: the same grain in every scene
 
 
-def add_soil(spec: mujoco.MjSpec, container: Container) -> None:
+def add_soil(spec: mujoco.MjSpec, container: Container, *, spacing_m: float) -> None:
     """Add the skins of the dig area and of the soil in the target box, the latter in the frame of the box."""
     _add_soil_materials(spec)
-    add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(), SURROUNDINGS_GROUP)
+    add_sheet(spec, TERRAIN_SKIN, "world", terrain_grid(spacing_m), SURROUNDINGS_GROUP)
     add_sheet(spec, BOX_SOIL_SKIN, "box", box_grid(container), SURROUNDINGS_GROUP)
 
 
-def terrain_grid() -> NDArray[np.float64]:
+def terrain_grid(spacing_m: float) -> NDArray[np.float64]:
     """Return the vertices of the terrain picture on the ground plane, shape (nx, ny, 2) [m]."""
-    return _grid(DIG_AREA_EXTENT_M)
+    return _grid(DIG_AREA_EXTENT_M, spacing_m)
 
 
 def box_grid(container: Container) -> NDArray[np.float64]:
     """Return the vertices of the picture of the soil in the box, box frame, shape (nx, ny, 2) [m]."""
     half_x, half_y = container.half_extent_m
-    return _grid((2 * half_x, 2 * half_y))
+    return _grid((2 * half_x, 2 * half_y), _BOX_SPACING_M)
 
 
 def skin_vertices(
@@ -61,8 +63,8 @@ def write_skin(model: mujoco.MjModel, name: str, vertices: NDArray[np.float32]) 
     model.skin_vert[start : start + len(vertices)] = vertices
 
 
-def _grid(shape_m: tuple[float, float]) -> NDArray[np.float64]:
-    counts = [max(2, round(size / _SPACING_M) + 1) for size in shape_m]
+def _grid(shape_m: tuple[float, float], spacing_m: float) -> NDArray[np.float64]:
+    counts = [max(2, round(size / spacing_m) + 1) for size in shape_m]
     x, y = (np.linspace(-size / 2, size / 2, n) for size, n in zip(shape_m, counts, strict=True))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
@@ -106,14 +108,19 @@ def _add_soil_materials(spec: mujoco.MjSpec) -> None:
 
     Most faces of a grain turn away from the sun; without a glow of their own, falling soil would be darker than a heap.
     """
-    rng = np.random.default_rng(_TEXTURE_SEED)
-    noise = rng.standard_normal((_TEXTURE_PIXELS, _TEXTURE_PIXELS))
-    frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(_TEXTURE_PIXELS)] * 2))
-    grain = np.fft.ifft2(np.fft.fft2(noise) / (1.0 + (12.0 * frequency) ** 2) ** 0.5).real
-    brightness = np.clip(225.0 + 22.0 * grain / grain.std(), 120.0, 255.0).astype(np.uint8)
     texture = spec.add_texture(name="grain", type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3)
     texture.width = texture.height = _TEXTURE_PIXELS
-    texture.data = np.repeat(brightness[..., None], 3, axis=2).tobytes()
+    texture.data = grain_texture(_TEXTURE_PIXELS)
     for name, glow in (("soil", 0.0), ("grains", _GRAIN_GLOW)):
         material = spec.add_material(name=name, specular=0.0, shininess=0.0, reflectance=0.0, emission=glow)
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "grain"
+
+
+def grain_texture(pixels: int) -> bytes:
+    """Return a tileable grain (pixels, pixels, 3) in shades of grey, which the colour of a material multiplies."""
+    rng = np.random.default_rng(_TEXTURE_SEED)
+    noise = rng.standard_normal((pixels, pixels))
+    frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(pixels)] * 2))
+    grain = np.fft.ifft2(np.fft.fft2(noise) / (1.0 + (12.0 * frequency) ** 2) ** 0.5).real
+    brightness = np.clip(225.0 + 22.0 * grain / grain.std(), 120.0, 255.0).astype(np.uint8)
+    return np.repeat(brightness[..., None], 3, axis=2).tobytes()

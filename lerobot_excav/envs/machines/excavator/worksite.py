@@ -37,6 +37,7 @@ class Worksite:
     Attributes:
         machine: The excavator.
         soil: The soil, with the box.
+        start_heights_m: Heights of the soil at the last reset (nx, ny) [m], read-only.
     """
 
     def __init__(self, *, soil: str | SoilParameters = "sand", fidelity: str = "standard") -> None:
@@ -48,6 +49,7 @@ class Worksite:
             fidelity=fidelity,
             container=TARGET_BOX,
         )
+        self.start_heights_m: NDArray[np.float64] = self.soil.heights_m.copy()
         self._ticks = 0
 
     def reset(self, start: WorksiteStart) -> None:
@@ -55,6 +57,7 @@ class Worksite:
         self.machine.set_appearance(start.appearance)
         self.machine.reset(start.joint_pos)
         self.soil.reset(start.heights_m)
+        self.start_heights_m = start.heights_m
         self._ticks = 0
 
     def tick(self, action: NDArray[np.float64]) -> Reaction:
@@ -63,6 +66,21 @@ class Worksite:
         self.machine.tick(action, reaction)
         self._ticks += 1
         return reaction
+
+    def surface_z_w(self, xy_w: NDArray[np.float64]) -> float:
+        """Return the world z [m] of what lies below a point (2,) [m]: soil, in the box or not, or the bare ground."""
+        boxed, box = self.soil.container_heights_m, self.machine.container
+        place = box.to_local(xy_w)
+        if boxed is None or (np.abs(place) >= box.half_extent_m).any():
+            return float(self.soil.height_at(xy_w))
+        cell = ((0.5 * place / box.half_extent_m + 0.5) * boxed.shape).astype(int)
+        return float(box.center_w[2] + boxed[tuple(cell)])
+
+    @property
+    def bucket_height_m(self) -> float:
+        """How high the cutting edge is over what lies below it [m]; below 0 in the soil."""
+        edge_w = self.machine.cutting_edge_pos_w
+        return float(edge_w[2] - self.surface_z_w(edge_w[:2]))
 
     @property
     def time_s(self) -> float:

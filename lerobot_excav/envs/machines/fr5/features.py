@@ -16,3 +16,6 @@ STATE_NAMES = ACTION_NAMES
 """Joint positions [rad] and opening of the gripper [0..1], in the order of `agent_pos`."""
 
 CAMERAS = ("main", "top", "target_mask")
+
+VIEWS = ("overview", "main", "top")
+"""Cameras that people may look through."""

@@ -36,7 +36,7 @@ TRAY_RIM_M = 0.012  # height of the rim above the tray's floor (kind: guess)
 CAMERAS = {
     "main": CameraPose((0.62, 0.60, 0.62), (0.14, 0.54, 0.0), 48.0),
     "top": CameraPose((0.0, 0.6, 0.8), (0.16, 0.575, 0.0), 40.0),
-    "overview": CameraPose((-0.75, 0.05, 0.75), (0.25, 0.5, 0.15), 42.0),
+    "overview": CameraPose((-0.90, -0.25, 0.75), (0.28, 0.53, 0.22), 38.0),
 }
 
 

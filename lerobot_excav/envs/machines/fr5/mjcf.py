@@ -18,10 +18,15 @@ _HARD_CELL: dict[str, Any] = {"solref": HARD_SOLREF, **CELL.arguments}
 
 
 def build_model() -> mujoco.MjModel:
-    """Compile the model.
+    """Compile the model of `build_spec`."""
+    return build_spec().compile()
+
+
+def build_spec() -> mujoco.MjSpec:
+    """Assemble the model.
 
     Returns:
-        A model with the joints and servos `j1` to `j6`, the servo `gripper`, the sites `flange` and `grasp`, the bodies
+        A spec with the joints and servos `j1` to `j6`, the servo `gripper`, the sites `flange` and `grasp`, the bodies
         `block0` to `block3` with free joints, the geoms `table`, `tray` and `block0` to `block3`, and the cameras of
         `layout.CAMERAS`.
     """
@@ -35,7 +40,7 @@ def build_model() -> mujoco.MjModel:
     add_gripper(spec, add_arm(spec, layout.BASE_POS_W))
     for name, pose in layout.CAMERAS.items():
         add_camera(spec.worldbody, name, pose)
-    return spec.compile()
+    return spec
 
 
 def _set_options(spec: mujoco.MjSpec) -> None:

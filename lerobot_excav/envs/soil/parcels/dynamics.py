@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
-from lerobot_excav.envs.soil.arrays import Indices
+from lerobot_excav.envs.soil.arrays import Array, Indices
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
+from lerobot_excav.envs.soil.parcels.impact import add_impulse
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket, turned
@@ -45,13 +46,14 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
 
 
 @kernel
-def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
+def press_pairs(state: State, pairs: Pairs, law: Law, dt: float, pushes: Array) -> float:
     """Add the forces of touching parcels on each other; change the memory of their contacts.
 
+    What others give to the load is added to `pushes` (6,), as `impact.add_impulse` does.
     Returns the fastest closing speed between a sleeping parcel and one that is awake [m/s].
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
-    masses, radii, asleep = state.masses, state.radii, state.asleep
+    masses, radii, asleep, load = state.masses, state.radii, state.asleep, state.load
     forces, torques, springs = state.forces, state.torques, pairs.springs
     hit = 0.0
     for i in range(len(masses)):
@@ -87,6 +89,9 @@ def press_pairs(state: State, pairs: Pairs, law: Law, dt: float) -> float:
                 mass = masses[j] if asleep[i] else masses[i]
                 hit = max(hit, -dot(velocity, n))
             force, roll = contact(springs, k, n, ri + rj - distance, velocity, rolling, mass, min(ri, rj), law, dt)
+            if load[i] != load[j]:
+                lens = (positions[i, 0] - ai * n[0], positions[i, 1] - ai * n[1], positions[i, 2] - ai * n[2])
+                add_impulse(pushes, lens, force, dt if load[i] else -dt)
             torque, rolling_torque = cross(n, force), cross(n, roll)
             for a in range(3):
                 forces[i, a] += force[a]
@@ -129,11 +134,13 @@ def advance(
     laws: Laws,
     dt: float,
     steps: int,
+    pushes: Array,
 ) -> tuple[Pairs, Pairs, float]:
     """Advance all parcels, in place, by some sub-steps of `dt` [s].
 
     `pairs` are the neighbours of the last call, in which the parcels had the rows `old_rows` (n,), -1 for a new one;
     `spare` is another list as large, whose content does not matter.
+    What others than the load and the ground give to load and plates is added to `pushes` (6,), as `add_impulse` does.
     Returns the neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
     """
     highest = max(site.heights.max(), site.level_z)
@@ -153,9 +160,9 @@ def advance(
             pairs, spare = new, pairs
         state.forces[:] = 0.0
         state.torques[:] = 0.0
-        hit = max(hit, press_pairs(state, pairs, laws.parcel, dt))
+        hit = max(hit, press_pairs(state, pairs, laws.parcel, dt, pushes))
         if tool.present:
-            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt)
+            press_bucket(state, step, tool, site.grid.dx, laws.steel, dt, pushes)
         press_ground(state, site, highest, laws.ground, dt)
         if site.box.half_x > 0.0:
             press_box(state, walls, site.box, laws.steel, dt)

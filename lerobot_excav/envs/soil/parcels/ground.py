@@ -3,7 +3,9 @@
 import math
 from typing import NamedTuple
 
-from lerobot_excav.envs.soil.arrays import Array, Vector
+import numpy as np
+
+from lerobot_excav.envs.soil.arrays import Array, Flags, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, in_grid
 from lerobot_excav.envs.soil.parcels.contact import Law, forget, wall_contact
@@ -59,6 +61,15 @@ def ground_below(site: Site, x: float, y: float) -> tuple[int, float, Vector]:
         place, h, sx, sy = TOUCHES_OUTSIDE, site.level_z, 0.0, 0.0
     length = math.sqrt(1.0 + sx * sx + sy * sy)
     return place, h, (-sx / length, -sy / length, 1.0 / length)
+
+
+@kernel
+def places_below(site: Site, points: Array) -> Flags:
+    """Return what lies below (n, 2) points, one of `store.TOUCHES_…` each."""
+    places = np.zeros(len(points), dtype=np.uint8)
+    for k in range(len(points)):
+        places[k] = ground_below(site, points[k, 0], points[k, 1])[0]
+    return places
 
 
 @kernel

@@ -7,6 +7,7 @@ from lerobot_excav.envs.soil.arrays import Array, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.cutting import to_tool
 from lerobot_excav.envs.soil.parcels.contact import SPRINGS, Law, cross, dot, forget, wall_contact
+from lerobot_excav.envs.soil.parcels.impact import add_impulse
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, OUTSIDE_OF_SHELL, SHELTERED, State
 
 CLOSEST = 0.25
@@ -134,11 +135,14 @@ def _wall_velocity(rotation: Array, linear: Array, angular: Array, c: Vector) ->
 
 
 @kernel
-def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float) -> None:
+def press_bucket(
+    state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float, pushes: Array
+) -> None:
     """Add the forces of the bucket's plates on the awake parcels, and note where each is at the bucket.
 
     `step` is the number of the sub-step. A parcel `opening_margin` [m] behind the opening is sheltered: there is no
-    ground for it.
+    ground for it. What parcels inside that are not load yet give to the plates is added to `pushes` (6,), as
+    `impact.add_impulse` does.
     """
     position, rotation = tool.positions[step], tool.rotations[step]
     # Plain arrays: taking one out of a named tuple costs more than the contact.
@@ -146,7 +150,7 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
     linear, angular = tool.linear, tool.angular
     positions, velocities, spins, radii = state.positions, state.velocities, state.spins, state.radii
     near_plate, shell, forces, torques = state.near_plate, state.shell, state.forces, state.torques
-    asleep, masses = state.asleep, state.masses
+    asleep, masses, load = state.asleep, state.masses, state.load
     plates = state.plate_springs.shape[1]
     springs = state.plate_springs.reshape((-1, SPRINGS))
     reach = bucket_reach(tool)
@@ -182,9 +186,19 @@ def press_bucket(state: State, step: int, tool: ToolPath, opening_margin: float,
             n = turned(rotation, ((q[0] - c[0]) / gap, (q[1] - c[1]) / gap, (q[2] - c[2]) / gap))
             wall = _wall_velocity(rotation, linear, angular, c)
             v = (velocities[i, 0] - wall[0], velocities[i, 1] - wall[1], velocities[i, 2] - wall[2])
+            closing = dot(v, n)
             v = keep_out(positions, velocities, i, n, gap, r, v, dt)
             w = (spins[i, 0], spins[i, 1], spins[i, 2])
             force, torque = wall_contact(springs, row, n, gap, v, w, masses[i], r, law, dt)
+            if not load[i] and side <= 0.0:
+                stopped = masses[i] * (dot(v, n) - closing)
+                given = (
+                    force[0] * dt + stopped * n[0],
+                    force[1] * dt + stopped * n[1],
+                    force[2] * dt + stopped * n[2],
+                )
+                at = turned(rotation, c)
+                add_impulse(pushes, (position[0] + at[0], position[1] + at[1], position[2] + at[2]), given, -1.0)
             for a in range(3):
                 forces[i, a] += force[a]
                 torques[i, a] += torque[a]

@@ -8,9 +8,11 @@ import numpy as np
 from lerobot_excav.envs.soil.arrays import Array, Bools, Flags, Indices
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
 from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
+from lerobot_excav.envs.soil.parcels.impact import Impact
+from lerobot_excav.envs.soil.parcels.joining import MOST_JOINED, STAYS, WITHOUT_ROOM, join
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
 from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
-from lerobot_excav.envs.soil.parcels.plates import ToolPath
+from lerobot_excav.envs.soil.parcels.plates import ToolPath, bucket_reach
 from lerobot_excav.envs.soil.parcels.store import (
     OUTSIDE_OF_SHELL,
     TOUCHES_BOX_FLOOR,
@@ -29,6 +31,19 @@ SETTLING_SPEED_M_S = 0.4
 
 SETTLING_TIME_S = 0.1
 """How long it has to be so slow."""
+
+SETTLING_PACE = 0.25
+"""Near a bucket that moves, a parcel rests only if it is slower than this share of the edge's speed: what goes with the
+bucket does not lie still, however slow that is (tuned: as much sand in the bucket at 0.05 m/s as at 1 m/s)."""
+
+STIRRING_M_S = 0.01
+"""Speed added to that, at which parcels at rest still stir (guess)."""
+
+STANDING_M_S = 0.02
+"""Speed of the edge below which the bucket stands still (guess)."""
+
+NEAR_BUCKET_M = 0.45
+"""How far beyond the bucket's corners soil may move along with it: the heap before its opening (guess)."""
 
 DROPPING_TIME_S = 1.0
 """How long a parcel may rest on steel or on others before it drops to the ground below (guess)."""
@@ -59,7 +74,11 @@ class Population:
     """All parcels, each in one row of `state`, where z counts from the rigid floor.
 
     They may touch so many plates, those of the bucket and of the box together. Radius and mass are those of a whole
-    parcel. Above the bound on the awake ones, a new parcel joins its nearest one instead.
+    parcel. Above the bound on the awake ones, a new parcel joins one near it instead.
+
+    Attributes:
+        state: The parcels.
+        impact: What they gave to the bucket in the last step, beyond a load that is welded to it.
     """
 
     def __init__(self, plates: int, laws: Laws, radius_m: float, mass_kg: float, most_awake: int) -> None:
@@ -69,6 +88,7 @@ class Population:
         self._mass_kg = mass_kg
         self._most_awake = most_awake
         self._rest = Rest()
+        self.impact = Impact()
         # Room to spare keeps large arrays from being allocated in every step.
         self._all = empty_state(_FIRST_CAPACITY, plates)
         self._pairs, self._spare = room_for(_FIRST_CAPACITY), room_for(_FIRST_CAPACITY)
@@ -78,7 +98,9 @@ class Population:
         """Remove all parcels."""
         self.state = rows(self._all, 0)
         self._rows: Indices = np.zeros(0, dtype=np.int64)
+        self._tool: ToolPath | None = None
         self._rest.clear()
+        self.impact.clear()
 
     def __setstate__(self, attributes: dict[str, Any]) -> None:
         """Restore a copy: `state` must look into its arrays again, since a copy of a view owns its data."""
@@ -100,58 +122,71 @@ class Population:
         """Number of parcels that are computed."""
         return int(len(self.state.asleep) - self.state.asleep.sum())
 
-    def add(self, positions: Array, velocities: Array, masses_kg: Array) -> None:
+    def add(self, positions: Array, velocities: Array, masses_kg: Array, *, apart: bool) -> Bools:
         """Add parcels at (n, 3) centres [m], z above the rigid floor, with (n, 3) velocities [m/s] and (n,) masses.
 
-        Their radius follows from their mass. Above the bound on awake parcels, mass and momentum join the nearest one.
+        Their radius follows from their mass. Above the bound on awake parcels, mass and momentum join the nearest one
+        that is not too large already. Apart: so does a parcel that would begin inside another one.
+
+        Returns (n,) which found no room; the caller has to put them elsewhere.
         """
         free = max(0, self._most_awake - self.awake_count)
-        count = min(free, len(positions))
-        new = empty_state(count, self._plates)
-        new.positions[:], new.velocities[:] = positions[:count], velocities[:count]
-        new.masses[:] = masses_kg[:count]
-        self._append(new)
-        for k in range(count, len(positions)):
-            self._absorb(positions[k], velocities[k], float(masses_kg[k]))
+        if apart or len(positions) > free:
+            without_room = self._join(positions, velocities, masses_kg, free, apart=apart)
+        else:
+            self._append(positions, velocities, masses_kg)
+            without_room = np.zeros(len(positions), dtype=np.bool_)
         self.state.radii[:] = self._radius_m * np.cbrt(self.state.masses / self._mass_kg)
+        return without_room
 
-    def _append(self, new: State) -> None:
+    def _append(self, positions: Array, velocities: Array, masses_kg: Array) -> None:
         """Add rows."""
-        old, count = self.state, len(self.state.masses) + len(new.masses)
+        old, added = self.state, len(positions)
+        count = len(old.masses) + added
         if count > len(self._all.masses):
             self._all = empty_state(2 * count, self._plates)
             copy_rows(old, self._all)
             self._pairs = enlarged(self._pairs, 2 * count)
             self._spare = room_for(2 * count)
+        new = empty_state(added, self._plates)
+        new.positions[:], new.velocities[:], new.masses[:] = positions, velocities, masses_kg
         copy_rows(new, State._make(array[len(old.masses) :] for array in self._all))
         self.state = rows(self._all, count)
-        self._rows = np.concatenate([self._rows, np.full(len(new.masses), -1, dtype=np.int64)])
+        self._rows = np.concatenate([self._rows, np.full(added, -1, dtype=np.int64)])
 
-    def _absorb(self, position: Array, velocity: Array, mass_kg: float) -> None:
-        """Let a new parcel join the nearest awake one; mass, momentum and centre of mass are kept."""
-        state = self.state
-        far = ((state.positions - position) ** 2).sum(axis=1)
-        far[state.asleep == 1] = np.inf
-        i = int(np.argmin(far))
-        share = mass_kg / (state.masses[i] + mass_kg)
-        state.positions[i] += share * (position - state.positions[i])
-        state.velocities[i] += share * (velocity - state.velocities[i])
-        state.masses[i] += mass_kg
+    def _join(self, positions: Array, velocities: Array, masses_kg: Array, free: int, *, apart: bool) -> Bools:
+        """Add rows for those that can stay, and let others join; return which found no room."""
+        state, old = self.state, len(self.state.masses)
+        points = np.concatenate([state.positions, positions])
+        moving = np.concatenate([state.velocities, velocities])
+        masses = np.concatenate([state.masses, masses_kg])
+        most_kg = max(MOST_JOINED * self._mass_kg, float(masses_kg.max(initial=0.0)))
+        fate = join(points, moving, masses, state.asleep, free, most_kg, self._radius_m if apart else 0.0)
+        state.positions[:], state.velocities[:], state.masses[:] = points[:old], moving[:old], masses[:old]
+        stay = old + np.flatnonzero(fate[old:] == STAYS)
+        self._append(points[stay], moving[stay], masses[stay])
+        return np.asarray(fate[old:] == WITHOUT_ROOM)
 
     def step(self, tool: ToolPath, site: Site, dt_s: float, *, cutting: bool) -> None:
         """Move all parcels and find the load of the bucket; cutting: soil entered it."""
+        self._tool = tool
+        if len(self.state.masses) == 0 or not tool.present:
+            self.impact.clear()
         if len(self.state.masses) == 0:
             return
-        steps, hit = len(tool.positions) - 1, 0.0
+        steps, hit, pushes = len(tool.positions) - 1, 0.0, np.zeros(6)
         if self.awake_count > 0:
             self._pairs, self._spare, hit = advance(
-                self.state, self._pairs, self._spare, self._rows, tool, site, self._laws, dt_s / steps, steps
+                self.state, self._pairs, self._spare, self._rows, tool, site, self._laws, dt_s / steps, steps, pushes
             )
             self._rows = np.arange(len(self.state.masses))
         elif tool.present:
             carry(self.state, tool, steps)
         if tool.present:
+            motion = tool.positions[-1], tool.linear, tool.angular
+            self.impact.moved(self.state, *motion, pushes)
             self._rest.update(self.state, tool, dt_s, hit, cutting=cutting)
+            self.impact.found(self.state, *motion)
 
     def freeze_load(self, tool: ToolPath) -> None:
         """Let the load sleep in a bucket that goes away, wherever that will come back; until then it stands still."""
@@ -160,6 +195,20 @@ class Population:
         self.state.velocities[sleeping] = 0.0
         self.state.spins[sleeping] = 0.0
         self._rest.clear()
+
+    def _settling_speeds(self) -> Array:
+        """Return the speeds [m/s] below which parcels may be at rest, (n,)."""
+        speeds = np.full(len(self.state.masses), SETTLING_SPEED_M_S)
+        tool = self._tool
+        if tool is None or not tool.present:
+            return speeds
+        edge = tool.rotations[-1] @ np.array([tool.profile[0, 0], 0.0, tool.profile[0, 1]])
+        pace = float(np.linalg.norm(tool.linear + np.cross(tool.angular, edge)))
+        if pace > STANDING_M_S:
+            away = self.state.positions - tool.positions[-1]
+            near = (away**2).sum(axis=1) < (bucket_reach(tool) + NEAR_BUCKET_M) ** 2
+            speeds[near] = min(SETTLING_SPEED_M_S, SETTLING_PACE * pace + STIRRING_M_S)
+        return speeds
 
     def settle(self, site: Site, dt_s: float) -> Landed:
         """Take out the parcels that have come to rest.
@@ -170,7 +219,7 @@ class Population:
         """
         state = self.state
         loose = (state.load == 0) & (state.asleep == 0)
-        slow = (state.velocities**2).sum(axis=1) < SETTLING_SPEED_M_S**2
+        slow = (state.velocities**2).sum(axis=1) < self._settling_speeds() ** 2
         state.calm_s[:] = np.where(loose & slow, state.calm_s + dt_s, 0.0)
         for i in np.flatnonzero((state.calm_s >= DROPPING_TIME_S) & (state.ground == TOUCHES_NOTHING)):
             state.ground[i] = ground_below(site, state.positions[i, 0], state.positions[i, 1])[0]

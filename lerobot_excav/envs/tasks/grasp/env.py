@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.fr5.layout import BLOCK_COUNT
 from lerobot_excav.envs.machines.fr5.rendering import WorkcellRenderer
+from lerobot_excav.envs.machines.fr5.viewing import WorkcellView
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
@@ -77,6 +78,17 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
 
     def _make_renderer(self, world: Workcell, height: int, width: int) -> WorkcellRenderer:
         return WorkcellRenderer(world, height=height, width=width)
+
+    def _make_view(self, height: int, width: int) -> WorkcellView:
+        return WorkcellView(self.workcell, height=height, width=width)
+
+    def _measured(self) -> tuple[str, ...]:
+        return f"block {self.grasp.stage}", f"return {self.grasp.episode_return:.0f}"
+
+    def _failure(self) -> str | None:
+        if not self.is_over or self.is_success:
+            return None
+        return "wrong block" if self.grasp.has_wrong_block else "not in the tray"
 
     def _start(self, scene_id: int, target_id: int) -> None:
         scene = draw_scene(self.settings.scene_set, scene_id)

@@ -1,6 +1,6 @@
 """FR5Grasp-v0 as data."""
 
-from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW, ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.machines.fr5.features import ACTION_HIGH, ACTION_LOW, ACTION_NAMES, CAMERAS, STATE_NAMES, VIEWS
 from lerobot_excav.envs.tasks.grasp.settings import EPISODE_DURATION_S, FR5Settings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
@@ -23,6 +23,7 @@ GRASP = TaskSpec(
     robot_type="fr5_sim",
     description="Put the block that the mask marks into the tray.",
     cameras=CAMERAS,
+    views=VIEWS,
     state_names=STATE_NAMES,
     action_names=ACTION_NAMES,
     action_low=ACTION_LOW,

@@ -16,6 +16,9 @@ REST_HEIGHT_TOLERANCE_M = 0.011
 """A block in the tray lies flat or leans on the rim: its centre is this close to its height when flat [m]. Leaning
 lifts it by up to 9.4 mm, lying on the rim by the rim's 12 mm (kind: tuned)."""
 
+_STAGES = ("not held", "touched", "lifted", "over the tray", "in the tray")
+"""What the rewards of the commanded block mean."""
+
 
 class GraspTask:
     """Follow one episode.
@@ -67,6 +70,21 @@ class GraspTask:
     def is_success(self) -> bool:
         """Whether the commanded block rests in the tray, released, and no other is over the tray, however it moves."""
         return bool(self._in_tray[self.target_id]) and int(self._over_tray.sum()) == 1
+
+    @property
+    def episode_return(self) -> float:
+        """Sum of the rewards so far."""
+        return self._return
+
+    @property
+    def stage(self) -> str:
+        """How far the commanded block has come, in words."""
+        return _STAGES[int(self._reward())]
+
+    @property
+    def has_wrong_block(self) -> bool:
+        """Whether a block is over the tray that was not commanded."""
+        return bool(np.delete(self._over_tray, self.target_id).any())
 
     @property
     def task_state(self) -> NDArray[np.float32]:

@@ -88,6 +88,17 @@ class DigCycle:
             and self.state.hard_target_contacts == 0
         )
 
+    @property
+    def failure(self) -> str | None:
+        """What has gone wrong for good, in words; None as long as the cycle can succeed, or has."""
+        if self.target_hit is False:
+            return "missed region"
+        if self.state.hard_target_contacts > 0:
+            return "hit the box"
+        if self.is_complete and self.state.deposited_mass_kg < LEAST_RETAINED_KG:
+            return "too little soil"
+        return None
+
     def metrics(self) -> dict[str, Any]:
         """Return the outcome part by part, as it goes into the metrics file."""
         return {

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.machines.excavator.viewing import WorksiteView
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
@@ -91,6 +92,20 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     def _make_renderer(self, world: Worksite, height: int, width: int) -> WorksiteRenderer:
         return WorksiteRenderer(world, height=height, width=width)
+
+    def _make_view(self, height: int, width: int) -> WorksiteView:
+        return WorksiteView(self.worksite, height=height, width=width)
+
+    def _visible_target(self, target_id: int) -> NDArray[np.float64]:
+        return self.scene.targets[target_id].corners_w
+
+    def _measured(self) -> tuple[str, ...]:
+        state, above_m = self.cycle.state, self.worksite.bucket_height_m
+        height = f"edge {above_m:.1f} m up" if above_m > 0.0 else "edge in the soil"
+        return f"load {state.bucket_mass_kg:.0f} kg", f"in the box {state.deposited_mass_kg:.0f} kg", height
+
+    def _failure(self) -> str | None:
+        return self.cycle.failure or ("not emptied in time" if self.is_over and not self.is_success else None)
 
     def _start(self, scene_id: int, target_id: int) -> None:
         scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)

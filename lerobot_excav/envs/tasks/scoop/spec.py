@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES
+from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES, VIEWS
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
@@ -28,6 +28,7 @@ SCOOP = TaskSpec(
     robot_type="excavator_sim",
     description="Dig where the mask points, carry the soil to the box and dump it there.",
     cameras=CAMERAS,
+    views=VIEWS,
     state_names=STATE_NAMES,
     action_names=ACTION_NAMES,
     action_low=(-1.0,) * len(ACTION_NAMES),

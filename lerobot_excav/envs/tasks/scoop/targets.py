@@ -28,6 +28,14 @@ class Target:
     yaw_rad: float  # direction from the machine to the patch [rad]
     size_m: float = PATCH_SIZE_M  # edge length [m]
 
+    @property
+    def corners_w(self) -> NDArray[np.float64]:
+        """Corners of the patch (4, 2) [m], counter-clockwise from above, world frame."""
+        along = 0.5 * self.size_m * np.array([np.cos(self.yaw_rad), np.sin(self.yaw_rad)])
+        across = np.array([-along[1], along[0]])
+        offsets = np.array([-along - across, along - across, along + across, across - along])
+        return np.asarray(self.center_w[:2] + offsets)
+
     def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points (..., 2) or (..., 3) [m], world frame, lie above, on or below the patch; NaN is outside."""
         offset = points_w[..., :2] - self.center_w[:2]

@@ -1,11 +1,13 @@
 """Task state: what is measured at every tick to judge a cycle. Never an input of a policy."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX, distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
-from lerobot_excav.envs.soil import Tool
+from lerobot_excav.envs.soil import Tool, ToolGeometry
 from lerobot_excav.envs.tasks.scoop.spec import TaskState
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
@@ -15,6 +17,8 @@ SPILL_LEAST_PAYLOAD_KG = 50.0
 SPILL_LEAST_DROP_KG = 5.0
 SPILL_BOX_GAIN_KG = 2.0
 FOOTPRINT_FADE_M = 0.25
+
+_HALF_DIG_AREA_M = 0.5 * np.array(DIG_AREA_EXTENT_M)
 
 
 class TaskMeter:
@@ -58,12 +62,11 @@ class TaskMeter:
 
         Soil falls for a while before the box gains it, so a drop above the box is no spill either.
         """
-        over_box = bool(distance_to_box_footprint_m(self._worksite.machine.cutting_edge_pos_w) == 0.0)
         return (
             previous_bucket_kg >= SPILL_LEAST_PAYLOAD_KG
             and drop_kg >= SPILL_LEAST_DROP_KG
             and gain_kg < SPILL_BOX_GAIN_KG
-            and not over_box
+            and bool(distance_to_box_footprint_m(self._worksite.machine.cutting_edge_pos_w) > 0.0)
         )
 
     def _count_hard_contact(self) -> None:
@@ -94,15 +97,25 @@ def depth_below_dig_plane_m(tool: Tool) -> float:
     The greatest depth over a 5 x 5 x 5 sample of the box, faded out over `FOOTPRINT_FADE_M` to both sides of the edge
     of the dig area. The box and not the shell, as in the definition this follows: its corners reach deeper.
     """
-    profile = tool.geometry.profile_t
-    low, high = profile.min(axis=0), profile.max(axis=0)
-    half_width = 0.5 * tool.geometry.inner_width_m
+    sample_t, reach_m = _box_samples(tool.geometry)
+    if tool.position_w[2] > reach_m:
+        return 0.0
+    sample_w = tool.position_w + sample_t @ tool.rotation_w.T
+    below_w = sample_w[sample_w[:, 2] < 0.0]
+    if len(below_w) == 0:
+        return 0.0
+    inset = np.min(_HALF_DIG_AREA_M - np.abs(below_w[:, :2]), axis=1)
+    return float(np.max(-below_w[:, 2] * _smoothstep(inset / FOOTPRINT_FADE_M)))
+
+
+@lru_cache(maxsize=4)
+def _box_samples(geometry: ToolGeometry) -> tuple[NDArray[np.float64], float]:
+    """Return the sample of a bucket's bounding box, (125, 3) in its frame [m], and how far from its origin it goes."""
+    low, high = geometry.profile_t.min(axis=0), geometry.profile_t.max(axis=0)
+    half_width = 0.5 * geometry.inner_width_m
     axes = (np.linspace(low[0], high[0], 5), np.linspace(-half_width, half_width, 5), np.linspace(low[1], high[1], 5))
     sample_t = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    sample_w = tool.position_w + sample_t @ tool.rotation_w.T
-    inset = np.min(0.5 * np.array(DIG_AREA_EXTENT_M) - np.abs(sample_w[:, :2]), axis=1)
-    depth = np.maximum(0.0, -sample_w[:, 2])
-    return float(np.max(depth * _smoothstep(inset / FOOTPRINT_FADE_M)))
+    return sample_t, float(np.linalg.norm(sample_t, axis=1).max())
 
 
 def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:

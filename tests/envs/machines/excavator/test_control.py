@@ -13,9 +13,15 @@ def follow(control, command, steps):
     """Step with joints that follow their reference perfectly; return the reference positions."""
     trace = []
     for _ in range(steps):
-        control.step(command, control.reference_pos, DT)
-        trace.append(list(control.reference_pos))
+        set_points_after(control, command, control.reference_pos.copy())
+        trace.append(control.reference_pos.copy())
     return np.array(trace)
+
+
+def set_points_after(control, command, joint_pos):
+    set_points = np.zeros(4)
+    control.step(np.array(command), np.array(joint_pos), DT, set_points)
+    return set_points
 
 
 @pytest.fixture
@@ -37,7 +43,7 @@ def test_full_stick_ramps_at_the_rated_acceleration_to_the_rated_speed(control, 
 
 
 def test_velocity_lead_cancels_the_damping_of_the_servo(control):
-    set_points = control.step([1.0, 0.0, 0.0, 0.0], HOME, DT)
+    set_points = set_points_after(control, [1.0, 0.0, 0.0, 0.0], HOME)
     lead = set_points[0] - control.reference_pos[0]
     force = const.SERVO_STIFFNESS_NM_RAD[0] * lead - const.SERVO_DAMPING_NMS_RAD[0] * control.reference_vel[0]
     assert force == pytest.approx(0.0, abs=1e-6)
@@ -46,13 +52,13 @@ def test_velocity_lead_cancels_the_damping_of_the_servo(control):
 
 def test_stalled_joint_does_not_wind_up(control):
     for _ in range(2000):
-        control.step([0.0, 1.0, 0.0, 0.0], HOME, DT)
+        set_points_after(control, [0.0, 1.0, 0.0, 0.0], HOME)
     assert control.reference_pos[1] - HOME[1] == pytest.approx(const.SERVO_DEFLECTION_RAD)
 
 
 def test_joint_pushed_away_takes_the_reference_along(control):
     pushed = [HOME[0], HOME[1] - 0.1, *HOME[2:]]
-    control.step([0.0] * 4, pushed, DT)
+    set_points_after(control, [0.0] * 4, pushed)
     assert control.reference_pos[1] == pytest.approx(pushed[1] + const.SERVO_DEFLECTION_RAD)
 
 

@@ -1,5 +1,3 @@
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -16,6 +14,17 @@ CARRYING = np.array([0.3, 0.5, -1.9, -1.9])
 DUMPING = np.array([1.39, 0.85, -1.5, -0.9])
 
 
+class StillWorksite:
+    """A worksite on which nothing has come to rest since the start."""
+
+    def __init__(self, machine, soil):
+        self.machine, self.soil = machine, soil
+
+    @property
+    def start_heights_m(self):
+        return self.soil.heights_m
+
+
 @pytest.fixture(scope="module")
 def shared_soil():
     return Soil(container=TARGET_BOX)
@@ -29,7 +38,7 @@ def soil(shared_soil):
 
 @pytest.fixture(scope="module")
 def module_renderer(machine):
-    renderer = WorksiteRenderer(SimpleNamespace(machine=machine), height=HEIGHT, width=WIDTH)
+    renderer = WorksiteRenderer(StillWorksite(machine, None), height=HEIGHT, width=WIDTH)
     yield renderer
     renderer.close()
 
@@ -185,7 +194,7 @@ def test_appearance_changes_the_picture(machine, renderer):
 
 def test_two_renderers_of_one_machine_do_not_disturb_each_other(machine, renderer, soil):
     before = renderer.render("main")
-    large = WorksiteRenderer(SimpleNamespace(machine=machine, soil=soil), height=120, width=160)
+    large = WorksiteRenderer(StillWorksite(machine, soil), height=120, width=160)
     assert large.render("main").shape == (120, 160, 3)
     large.close()
     np.testing.assert_array_equal(renderer.render("main"), before)

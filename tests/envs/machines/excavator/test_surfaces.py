@@ -7,7 +7,7 @@ from .conftest import skin_mesh
 
 
 def test_vertices_are_the_surface_and_a_skirt_below_its_border():
-    grid = surfaces._grid((0.4, 0.3))
+    grid = surfaces._grid((0.4, 0.3), 0.1)
     heights = np.arange(20.0).reshape(5, 4) / 10
     vertices = surfaces.skin_vertices(grid, heights)
     np.testing.assert_allclose(vertices[:20].reshape(5, 4, 3)[..., 2], heights, rtol=1e-6)

@@ -53,7 +53,7 @@ def test_sub_steps_are_those_of_the_reference(seed, cohesion, has_tool):
         state.places_t[:] = (state.positions - tool.positions[0]) @ tool.rotations[0]
     twin = deepcopy(state)
     hit = run(state, steps, ground, tool, laws)
-    assert hit == pytest.approx(reference.advance(twin, {}, tool, ground, laws, DT, steps), abs=1e-9)
+    assert hit == pytest.approx(reference.advance(twin, {}, tool, ground, laws, DT, steps, np.zeros(6)), abs=1e-9)
     assert_same(state, twin, "positions", "velocities", "spins", "ground_springs", "plate_springs", "ground", "shell")
     assert np.linalg.norm(state.velocities, axis=1).max() <= LARGEST_SPEED_M_S + 1e-9
 
@@ -153,11 +153,11 @@ def test_what_contacts_remember_outlives_new_lists_of_neighbours(rng):
     anchor, made = state.positions.copy(), 0
     pairs, spare, rows = room_for(16), room_for(16), np.full(16, -1, dtype=np.int64)
     for _ in range(60):
-        pairs, spare, _ = advance(state, pairs, spare, rows, no_tool(5), site(), sticky, DT, 5)
+        pairs, spare, _ = advance(state, pairs, spare, rows, no_tool(5), site(), sticky, DT, 5, np.zeros(6))
         rows = np.arange(16)
         made += not np.array_equal(pairs.anchors[:16], anchor)
         anchor = pairs.anchors[:16].copy()
-        reference.advance(twin, memory, no_tool(5), site(), sticky, DT, 5)
+        reference.advance(twin, memory, no_tool(5), site(), sticky, DT, 5, np.zeros(6))
     assert made > 20
     assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) >= 20
     np.testing.assert_allclose(state.positions, twin.positions, atol=1e-9)

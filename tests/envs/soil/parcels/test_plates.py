@@ -38,12 +38,15 @@ def test_bucket_and_box_press_parcels_as_their_polygons_do(seed, at_box):
     state = random_state(rng, 20, [0.8, 0.6, 0.6], centre=near)
     state.asleep[:] = rng.random(20) < 0.2
 
+    pushes = {plates: np.zeros(6), reference: np.zeros(6)}
+
     def act(module):
         if at_box:
             return lambda parcels, _: module.press_box(parcels, SHELL + 2, BOX, LAWS.steel, DT)
-        return lambda parcels, step: module.press_bucket(parcels, step, tool, MARGIN, LAWS.steel, DT)
+        return lambda parcels, step: module.press_bucket(parcels, step, tool, MARGIN, LAWS.steel, DT, pushes[module])
 
     press_both(state, act(plates), act(reference), "plate_springs", "shell", times=4)
+    np.testing.assert_allclose(pushes[plates], pushes[reference], atol=1e-9)
 
 
 @given(point=points)
@@ -56,7 +59,7 @@ def test_a_plate_puts_a_parcel_that_came_too_near_back_on_its_own_side(point):
     gaps = np.array([np.linalg.norm(away) for away in before])
     if (gaps < RADIUS).sum() != 1 or gaps.min() < 1e-6:
         return  # in a corner, plates push one after the other; exactly on a plate, there is no side
-    plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT)
+    plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT, np.zeros(6))
     point_t = state.positions[0] @ tool.rotations[0]
     for plate, away in zip(polygons, before, strict=True):
         after = point_t - reference.nearest_point(plate, point_t)
@@ -73,7 +76,7 @@ def test_a_contact_is_forgotten_when_its_parcel_leaves_the_reach_of_the_bucket_o
     outwards = np.array([corner / np.linalg.norm(corner), (BOX.cos, BOX.sin, 0.0)])
     for gap in (0.99, 1.2):  # in one sub-step, a parcel moves by less than a radius
         state.positions[:] = [corner, wall] + gap * RADIUS * outwards
-        plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT)
+        plates.press_bucket(state, 0, tool, MARGIN, LAWS.steel, DT, np.zeros(6))
         plates.press_box(state, SHELL + 2, BOX, LAWS.steel, DT)
         if gap < 1.0:
             assert state.plate_springs[0].any()

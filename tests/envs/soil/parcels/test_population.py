@@ -32,7 +32,7 @@ NO_GROUND = Site(np.zeros((2, 2)), Grid(0.0, 0.0, 1e-6, 1e-6), np.zeros((1, 1)),
 def add(population, positions, velocities=None, masses=None):
     points = np.asarray(positions, dtype=np.float64)
     moving = np.zeros_like(points) if velocities is None else np.asarray(velocities, dtype=np.float64)
-    population.add(points, moving, np.full(len(points), MASS) if masses is None else np.asarray(masses))
+    population.add(points, moving, np.full(len(points), MASS) if masses is None else np.asarray(masses), apart=False)
 
 
 @given(seed=st.integers(0, 2**16))
@@ -106,7 +106,7 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
             joined += tick > 0
         twin = deepcopy(population.state)
         population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
-        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS)
+        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS, np.zeros(6))
         np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
         gone = (population.state.ground == TOUCHES_OUTSIDE) & (population.state.load == 0)

@@ -136,18 +136,18 @@ def test_the_operator_follows_a_new_command_before_it_digs(env):
     assert metrics["is_success"]
 
 
-def test_rendering_draws_the_main_view_once_per_frame(monkeypatch):
+def test_the_main_view_is_drawn_once_per_frame(monkeypatch):
     env = ExcavatorEnv()
     drawn = []
     render = env.renderer.render
     monkeypatch.setattr(env.renderer, "render", lambda camera: (drawn.append(camera), render(camera))[1])
     env.reset(seed=2)
-    env.render()[...] = 0
+    env.picture()[...] = 0
     assert drawn.count("main") == 1
-    assert np.array_equal(env.render(), render("main"))
+    assert np.array_equal(env.picture(), render("main"))
     for _ in range(5):
         observation = env.step(np.array([1.0, 0.5, 0.0, 0.0]))[0]
-    assert np.array_equal(env.render(), observation["pixels"]["main"])
+    assert np.array_equal(env.picture(), observation["pixels"]["main"])
     assert drawn.count("main") == 6
     env.close()
 
@@ -159,3 +159,28 @@ def test_successful_cycle_pays_its_soil_and_one_for_success(env):
     assert terminated
     assert metrics["is_success"] is info["is_success"] is True
     assert total == pytest.approx(metrics["retained_mass_kg"] / FULL_BUCKET_KG + 1.0)
+
+
+def test_the_caption_tells_load_and_deposit(env):
+    env.reset(options={"scene_id": 0, "target_id": 0})
+    state = env.cycle.state
+    state.bucket_mass_kg, state.deposited_mass_kg = 312.4, 95.6
+    words = env._caption().words
+    assert words[:2] == ("load 312 kg", "in the box 96 kg")
+    assert "0.0 s" in words
+
+
+@pytest.mark.parametrize(
+    ("hit", "contacts", "deposited", "failure"),
+    [
+        (None, 0, 0.0, None),
+        (True, 0, 0.0, None),
+        (False, 0, 0.0, "missed region"),
+        (True, 1, 300.0, "hit the box"),
+    ],
+)
+def test_a_failure_is_told_as_soon_as_it_is_certain(env, hit, contacts, deposited, failure):
+    env.reset(options={"scene_id": 0, "target_id": 0})
+    env.cycle.target_hit = hit
+    env.cycle.state.hard_target_contacts, env.cycle.state.deposited_mass_kg = contacts, deposited
+    assert env._caption().outcome == failure

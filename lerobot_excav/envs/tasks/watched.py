@@ -1,0 +1,104 @@
+"""What a person sees of an episode: `render()`, hence LeRobot's videos of evaluations."""
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.view import View
+from lerobot_excav.envs.masks.source import TargetMask
+from lerobot_excav.envs.tasks.caption import Caption, captioned
+from lerobot_excav.envs.tasks.settings import RenderSettings, TaskSettings
+
+
+class WatchedEnv(ABC):
+    """An environment whose episodes people watch, with other pictures than its policies see.
+
+    Nothing of them is made before the first `render()`.
+    """
+
+    render_mode: str | None
+    render_settings: RenderSettings
+    settings: TaskSettings
+
+    _is_over = False
+    _view: View | None = None
+
+    @abstractmethod
+    def _make_view(self, height: int, width: int) -> View:
+        """Make what draws the world for people."""
+
+    def _visible_target(self, target_id: int) -> Any:
+        """Return a target of the scene as the view knows it."""
+        return target_id
+
+    def _measured(self) -> tuple[str, ...]:
+        """Return what a caption says of the episode now, the most telling first."""
+        return ()
+
+    def _failure(self) -> str | None:
+        """Return why the task has failed, in two or three words, or None if it is not decided yet."""
+        return "failed" if self.is_over and not self.is_success else None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the episode has ended."""
+        return self._is_over
+
+    @property
+    @abstractmethod
+    def target_id(self) -> int:
+        """Index of the target that is commanded now."""
+
+    @property
+    @abstractmethod
+    def mask(self) -> TargetMask | None:
+        """The mask of the command, as shown."""
+
+    @property
+    @abstractmethod
+    def is_success(self) -> bool:
+        """Whether the task has succeeded by now."""
+
+    @property
+    @abstractmethod
+    def time_s(self) -> float:
+        """Simulated time since the start of the episode [s]."""
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture for people (`render_height`, `render_width`, 3) uint8, or None without a render mode.
+
+        The commanded target is marked, and another target that the mask shows; a caption tells how the task stands.
+
+        Raises:
+            ConfigurationError: The environment has not been reset.
+            RenderingError: Pictures cannot be made on this machine.
+        """
+        if self.render_mode is None:
+            return None
+        settings = self.render_settings
+        if self._view is None:
+            self._view = self._make_view(settings.render_height, settings.render_width)
+        other = self._other_target_shown()
+        self._view.mark(
+            self._visible_target(self.target_id), shown=None if other is None else self._visible_target(other)
+        )
+        return captioned(self._view.render(settings.render_camera), self._caption())
+
+    def _other_target_shown(self) -> int | None:
+        """Return the target that the mask shows, unless it is the commanded one or none that the source could name."""
+        shown = None if self.mask is None else self.mask.target_id
+        return None if shown == self.target_id else shown
+
+    def _caption(self) -> Caption:
+        words = (*self._measured(), f"{self.time_s:.1f} s", *self.settings.mask_faults)
+        if self.is_over and self.is_success:
+            return Caption(words=words, outcome="success", is_success=True)
+        return Caption(words=words, outcome=self._failure(), is_success=False)
+
+    def _close_view(self) -> None:
+        """Free the graphics context of the view."""
+        if self._view is not None:
+            self._view.close()
+            self._view = None
