@@ -23,8 +23,8 @@ _LEVEL = 0.3
 """A face whose outward normal has a smaller horizontal part pushes soil along the motion instead (guess)."""
 
 _SHIFT_X, _SHIFT_Y = math.sqrt(2.0) - 1.0, 0.5 * (math.sqrt(5.0) - 1.0)
-"""By how much of a cell the line of a column moves from row to row. Multiples of the golden ratio are spread most evenly
-(Weyl's equidistribution); the other is far from it, so that rows along the diagonals are spread evenly too."""
+"""By how much of a cell the line of a column moves from row to row. Multiples of an irrational number are spread evenly
+over a cell (Weyl's equidistribution), and so are those of the difference and the sum, along the diagonals (guess)."""
 
 
 @kernel
@@ -216,7 +216,8 @@ def cut(
     """Move the bucket through the soil by one sub-step; heights [m], avalanche marks and `intake` change in place.
 
     The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
-    can still take a volume `room` [m3], and over the last `fade` [m3] of it ever less of what meets the opening. Returns the volumes [m3] that entered and that were pushed over the border.
+    can still take a volume `room` [m3], and over the last `fade` [m3] of it ever less of what meets the opening.
+    Returns the volumes [m3] that entered and that were pushed over the border.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):

@@ -94,7 +94,7 @@ def test_a_bucket_in_motion_gives_the_soil_its_own_velocity_and_no_more(velocity
 
 
 def test_soil_that_falls_on_a_sleeping_load_is_felt_through_it():
-    soil, first = fallen(0.3, 50)
+    soil, _ = fallen(0.3, 50)
     assert soil.parcel_is_asleep.all()
     load, reactions = soil.payload_mass_kg, []
     soil.add_parcels(over(held(), 10, 1.0), np.zeros((10, 3)))
@@ -131,7 +131,7 @@ def test_a_sleeping_load_that_is_carried_gives_nothing():
 def test_the_angular_impulse_is_that_of_the_impulse_where_the_soil_falls():
     soil = Soil()
     soil.step(TICK_S, held())
-    points = over(held(), 1, 0.5) + [0.1, 0.2, 0.0]
+    points = over(held(), 1, 0.5) + np.array([0.1, 0.2, 0.0])
     soil.add_parcels(points, np.zeros((1, 3)))
     seen = [(soil.step(TICK_S, held()), soil.parcel_positions_w[0]) for _ in range(40)]
     blow, place = max(seen, key=lambda pair: -pair[0].impulse_w_ns[2])

@@ -10,7 +10,7 @@ from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.worksite import Worksite, WorksiteStart
 
-POSE = np.array([0.0, 0.9, -1.5, -1.9])
+POSE = np.array([0.0, 0.9, -1.5, -2.4])
 """The bucket is raised and looks up."""
 
 FALL_M = 2.0
@@ -26,12 +26,12 @@ def worksite():
 
 
 def drop(site):
-    """Let five by five parcels fall into the bucket; return their mass [kg] and the middle of the bucket [m]."""
+    """Let three by five parcels fall into the bucket; return their mass [kg] and the middle of the bucket [m]."""
     tool = site.machine.tool()
     middle = tool.position_w + tool.rotation_w @ [0.6, 0.0, 0.2]
-    layer = 0.125 * np.array([(x, y, 0.0) for x in range(-2, 3) for y in range(-2, 3)])
-    site.soil.add_parcels(middle + layer + [0.0, 0.0, FALL_M], np.zeros((25, 3)))
-    return 25 * site.soil.parcel_mass_kg, middle
+    layer = 0.125 * np.array([(x, y, 0.0) for x in range(-1, 2) for y in range(-2, 3)])
+    site.soil.add_parcels(middle + layer + [0.0, 0.0, FALL_M], np.zeros((15, 3)))
+    return 15 * site.soil.parcel_mass_kg, middle
 
 
 def kinetic_energy_j(machine):
