@@ -10,9 +10,9 @@ import math
 from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
+from lerobot_excav.envs.soil.layer import mark_around
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Bins, gather
-from lerobot_excav.envs.soil.relaxation import mark_around
 
 OPENING = 0
 """Index of the opening among the planes of a tool."""
