@@ -8,7 +8,7 @@ it looks down it bears: the pressure grows with the sinkage as Bekker measured (
 (1 - slope)^2 (Vesic 1975). It counts by the square of the downward part of the normal (guess).
 
 The sinkage is how far the soil under a piece has been pressed down. Level travel brings fresh soil under it, whatever
-its direction: the sinkage is renewed over the length of the contact.
+its direction: the sinkage is renewed over the distance from the front of the contact.
 
 The ground meets a plate at its thickness outside of the profile: the cut clears the inside of the plates, so that soil
 which touches one reaches as deep into its outer face. The bearing is whole there and starts from zero at contact.
@@ -77,18 +77,21 @@ def overlap(heights: Array, grid: Grid, x: float, y: float, z: float, normal: Ar
 
 @kernel
 def surroundings(heights: Array, grid: Grid, x: float, y: float, forward: Level) -> tuple[float, float]:
-    """Return the lowest and the highest surface around a point, ahead, behind, left and right of a bucket [m]."""
-    lowest, highest = math.inf, -math.inf
+    """Return the lowest surface around a point, and the level of the ground there without what was dug away [m].
+
+    They are read ahead, behind, left and right of a bucket. The level is the lower one of the two means of opposite
+    sides: that of the slope on a slope, that of the floor in a trench.
+    """
+    levels = np.zeros(4)
     for k in range(4):
-        c, s = (1.0, 0.0) if k == 0 else (0.0, 1.0) if k == 1 else (-1.0, 0.0) if k == 2 else (0.0, -1.0)
-        level = surface_height(
+        c, s = (1.0, 0.0) if k == 0 else (-1.0, 0.0) if k == 1 else (0.0, 1.0) if k == 2 else (0.0, -1.0)
+        levels[k] = surface_height(
             heights,
             grid,
             x + FALL_REACH_M * (c * forward[0] - s * forward[1]),
             y + FALL_REACH_M * (c * forward[1] + s * forward[0]),
         )
-        lowest, highest = min(lowest, level), max(highest, level)
-    return lowest, highest
+    return levels.min(), 0.5 * min(levels[0] + levels[1], levels[2] + levels[3])
 
 
 @kernel
@@ -148,37 +151,42 @@ def blunt_pressure(depth: float, normal: Array, soil: SoilStrength) -> float:
 
 
 @kernel
-def contact_length(starts: Array, ends: Array, shares: Array, is_edge: Bools, width: float, velocity: Array) -> float:
-    """Return the length [m] of the contact along a level velocity, over the buried pieces of the shell."""
+def renewal_lengths(points: Array, shares: Array, is_edge: Bools, velocity: Array, width: float) -> Array:
+    """Return after how much level travel fresh soil lies under each piece [m].
+
+    It is the distance from the front of the contact, over the buried pieces of the shell, each as wide as a row. The
+    edge is a contact of its own, as long as it is thick.
+    """
+    lengths = np.full(len(points), PLATE_THICKNESS_M)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
     if speed == 0.0:
-        return math.inf
-    x, y = velocity[0] / speed, velocity[1] / speed
-    low, high = math.inf, -math.inf
-    for k in range(len(starts)):
+        return lengths
+    front = -math.inf
+    ways = (points[:, 0] * velocity[0] + points[:, 1] * velocity[1]) / speed
+    for k in range(len(points)):
         if shares[k] > 0.0 and not is_edge[k]:
-            first, last = x * starts[k, 0] + y * starts[k, 1], x * ends[k, 0] + y * ends[k, 1]
-            low, high = min(low, min(first, last)), max(high, max(first, last))
-    return max(high - low, PLATE_THICKNESS_M) if high > low else max(width, PLATE_THICKNESS_M)
+            front = max(front, ways[k] + 0.5 * width)
+    for k in range(len(points)):
+        if not is_edge[k]:
+            lengths[k] = max(PLATE_THICKNESS_M, front - ways[k])
+    return lengths
 
 
 @kernel
 def press_down(
-    sinkages: Array, ground: Array, shares: Array, zs: Array, velocities: Array, lengths: Level, is_edge: Bools, dt: float
+    sinkages: Array, grounds: Array, shares: Array, zs: Array, velocities: Array, lengths: Array, dt: float
 ) -> None:
     """Bring sinkages up to date: what the soil under each piece was pressed down, renewed over a length of travel.
 
-    `ground` is the highest surface around each: nothing has sunk in deeper than that. `lengths` are those of the
-    contact of the shell and of the edge.
+    `grounds` is the level of the ground around each (`surroundings`): nothing has sunk in deeper than that.
     """
     for k in range(len(sinkages)):
         if shares[k] <= 0.0:
             sinkages[k] = 0.0
             continue
         travel = dt * math.sqrt(velocities[k, 0] ** 2 + velocities[k, 1] ** 2)
-        kept = math.exp(-travel / (lengths[1] if is_edge[k] else lengths[0]))
-        sunk = kept * (sinkages[k] - dt * velocities[k, 2])
-        sinkages[k] = min(max(sunk, 0.0), max(ground[k] - zs[k], 0.0))
+        sunk = math.exp(-travel / lengths[k]) * (sinkages[k] - dt * velocities[k, 2])
+        sinkages[k] = min(max(sunk, 0.0), max(grounds[k] - zs[k], 0.0))
 
 
 @kernel
@@ -207,7 +215,7 @@ def shell_limits(
     count = len(starts)
     points, limits = np.zeros((count, 3)), np.zeros(count)
     shares, contacts, depths = np.zeros(count), np.zeros(count), np.zeros(count)
-    highest, falls = np.zeros(count), np.zeros(count)
+    grounds, falls = np.zeros(count), np.zeros(count)
     outer_starts, outer_ends = starts + PLATE_THICKNESS_M * normals, ends + PLATE_THICKNESS_M * normals
     footing, mean = 0.0, np.zeros(3)
     for k in range(count):
@@ -219,14 +227,14 @@ def shell_limits(
         mean += velocities[k] / count
         if shares[k] > 0.0:
             contacts[k] = min(1.0, depth / PLATE_THICKNESS_M)
-            lowest, highest[k] = surroundings(heights, grid, points[k, 0], points[k, 1], forward)
+            lowest, grounds[k] = surroundings(heights, grid, points[k, 0], points[k, 1], forward)
             depths[k] = max(0.0, lowest - points[k, 2])
             falls[k] = surface_height(heights, grid, points[k, 0], points[k, 1]) - lowest
             if not is_edge[k]:
                 length = math.sqrt(np.sum((b - a) ** 2))
                 footing += contacts[k] * shares[k] * length * max(0.0, -normals[k, 2]) / rows
-    lengths = (contact_length(outer_starts, outer_ends, shares, is_edge, width * rows, mean), PLATE_THICKNESS_M)
-    press_down(sinkages, highest, shares, points[:, 2], velocities, lengths, is_edge, dt)
+    lengths = renewal_lengths(points, shares, is_edge, mean, width)
+    press_down(sinkages, grounds, shares, points[:, 2], velocities, lengths, dt)
     fronts = standing(heights, grid, starts, ends, normals)
     for k in range(count):
         area = width * math.sqrt(np.sum((ends[k] - starts[k]) ** 2))
