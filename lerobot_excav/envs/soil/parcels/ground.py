@@ -105,9 +105,7 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
                 positions[i, a] += lift * normal[a]
         velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
         spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-        force, torque = wall_contact(
-            springs, i, normal, min(max(gap, 0.0), r), velocity, spin, masses[i], r, law, dt
-        )
+        force, torque = wall_contact(springs, i, normal, min(max(gap, 0.0), r), velocity, spin, masses[i], r, law, dt)
         for a in range(3):
             forces[i, a] += force[a]
             torques[i, a] += torque[a]
