@@ -39,7 +39,7 @@ def measure_cycles(settings: DemonstrationSettings) -> list[Measurement]:
     levels = declared_settings(type(settings.env)).get("fidelity")
     results = []
     for fidelity in (None,) if levels is None else levels.values or ():
-        env = settings.env if fidelity is None else replace(settings.env, fidelity=fidelity)
+        env = settings.env if fidelity is None else replace(settings.env, **{"fidelity": fidelity})
         played = replace(settings, env=env)
         play_demonstration(played, played.pairs()[0], with_images=False)  # the first cycle loads or compiles kernels
         start, frames = time.process_time(), 0

@@ -84,11 +84,16 @@ def kernel[F: Callable[..., Any]](function: F) -> F:
 
 @cache
 def _say_that_nothing_is_kept(folder: str) -> None:
-    print(
+    _say(
         f"Compiled code of the simulation cannot be kept: {folder} cannot be written. Every start compiles it again, "
-        "which takes about a minute; set NUMBA_CACHE_DIR to a folder that can be written.",
-        file=sys.stderr,
+        "which takes about a minute; set NUMBA_CACHE_DIR to a folder that can be written."
     )
+
+
+def _say(words: str) -> None:
+    """Write a line to stderr at once: what follows takes long."""
+    sys.stderr.write(f"{words}\n")
+    sys.stderr.flush()
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]  # numba is untyped here
@@ -100,7 +105,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba is untyped h
     def on_start(self, event: Any) -> None:
         if not self.is_made:
             self.is_made = True
-            print("Compiling the simulation: about a minute, this once ...", file=sys.stderr, flush=True)
+            _say("Compiling the simulation: about a minute, this once ...")
 
     def on_end(self, event: Any) -> None:
         """Stay quiet: hundreds of functions are compiled."""
@@ -113,4 +118,4 @@ def announced() -> Iterator[None]:
     with event.install_listener("numba:compile", announcement):
         yield
     if announcement.is_made:
-        print(f"Compiled in {time.perf_counter() - start:.0f} s.", file=sys.stderr, flush=True)
+        _say(f"Compiled in {time.perf_counter() - start:.0f} s.")

@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.appearance import Appearance
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
@@ -12,7 +13,7 @@ from lerobot_excav.envs.soil.compiled import announced
 
 _GROUND_M = 0.8
 _PIN = (4.6, 0.35, -1.9, 0.0)
-"""Radius and height of the cutting edge [m], pitch and swing of the bucket [rad]: in the ground, open to the machine."""
+"""Radius and height of the cutting edge [m], pitch and swing of the bucket [rad]: in the ground."""
 
 _TICKS = 20
 """Enough to dig a few parcels, and for loose soil to come to rest."""
@@ -29,7 +30,7 @@ def rehearse() -> None:
         site = Worksite(fidelity="fast")
         start = inverse(*_PIN)
         assert start is not None  # a pose of our own choice
-        heights: np.ndarray = np.full(site.soil.heights_m.shape, _GROUND_M)
+        heights: NDArray[np.float64] = np.full(site.soil.heights_m.shape, _GROUND_M)
         site.reset(WorksiteStart(joint_pos=start, heights_m=heights, appearance=Appearance()))
         site.soil.height_at(np.zeros(2))
         site.soil.add_parcels(*_loose_soil(site.soil.parcel_radius_m))
@@ -37,7 +38,7 @@ def rehearse() -> None:
             site.tick(np.array([0.2, 0.1, -1.0, -0.5]))
 
 
-def _loose_soil(radius_m: float) -> tuple[np.ndarray, np.ndarray]:
+def _loose_soil(radius_m: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return places and velocities of parcels that lie on the ground, in the box and beside both; two collide."""
     above = _GROUND_M + radius_m
     places = [[2.0, 2.0, above], [2.0, 2.0, above + 1.5 * radius_m], [*TARGET_BOX.center_w[:2], radius_m]]

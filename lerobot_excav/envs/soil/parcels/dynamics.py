@@ -35,14 +35,16 @@ def carry(state: State, tool: ToolPath, step: int) -> None:
     """Move the sleeping parcels of a state, in place, to where they lie in the bucket at its pose number `step`."""
     position, rotation = tool.positions[step], tool.rotations[step]
     w = (tool.angular[0], tool.angular[1], tool.angular[2])
-    for i in range(len(state.masses)):
-        if state.asleep[i]:
-            arm = turned(rotation, (state.places_t[i, 0], state.places_t[i, 1], state.places_t[i, 2]))
+    asleep, places, linear = state.asleep, state.places_t, tool.linear
+    positions, velocities, spins = state.positions, state.velocities, state.spins
+    for i in range(len(asleep)):
+        if asleep[i]:
+            arm = turned(rotation, (places[i, 0], places[i, 1], places[i, 2]))
             turning = cross(w, arm)
             for a in range(3):
-                state.positions[i, a] = position[a] + arm[a]
-                state.velocities[i, a] = tool.linear[a] + turning[a]
-                state.spins[i, a] = w[a]
+                positions[i, a] = position[a] + arm[a]
+                velocities[i, a] = linear[a] + turning[a]
+                spins[i, a] = w[a]
 
 
 @kernel
@@ -104,23 +106,25 @@ def press_pairs(state: State, pairs: Pairs, law: Law, dt: float, pushes: Array) 
 @kernel
 def _integrate(state: State, dt: float) -> None:
     """Advance the awake parcels: velocities first, then positions with the new velocities."""
-    for i in range(len(state.masses)):
-        if state.asleep[i]:
+    positions, velocities, spins, masses = state.positions, state.velocities, state.spins, state.masses
+    radii, asleep, forces, torques = state.radii, state.asleep, state.forces, state.torques
+    for i in range(len(masses)):
+        if asleep[i]:
             continue
-        inertia = 0.4 * state.masses[i] * state.radii[i] ** 2
+        inertia = 0.4 * masses[i] * radii[i] ** 2
         speed = 0.0
         for a in range(3):
-            state.velocities[i, a] += dt * state.forces[i, a] / state.masses[i]
-            state.spins[i, a] += dt * state.torques[i, a] / inertia
-        state.velocities[i, 2] -= dt * GRAVITY_M_S2
+            velocities[i, a] += dt * forces[i, a] / masses[i]
+            spins[i, a] += dt * torques[i, a] / inertia
+        velocities[i, 2] -= dt * GRAVITY_M_S2
         for a in range(3):
-            speed += state.velocities[i, a] ** 2
+            speed += velocities[i, a] ** 2
         if speed > LARGEST_SPEED_M_S**2:
             share = LARGEST_SPEED_M_S / math.sqrt(speed)
             for a in range(3):
-                state.velocities[i, a] *= share
+                velocities[i, a] *= share
         for a in range(3):
-            state.positions[i, a] += dt * state.velocities[i, a]
+            positions[i, a] += dt * velocities[i, a]
 
 
 @kernel

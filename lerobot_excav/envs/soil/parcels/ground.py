@@ -81,9 +81,11 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
     """
     positions, velocities, spins = state.positions, state.velocities, state.spins
     springs, on_ground, near_plate = state.ground_springs, state.on_ground, state.near_plate
-    for i in range(len(state.masses)):
-        r = state.radii[i]
-        if state.asleep[i] or state.shell[i] == SHELTERED or positions[i, 2] > highest + r:
+    masses, radii, asleep, shell = state.masses, state.radii, state.asleep, state.shell
+    forces, torques, ground = state.forces, state.torques, state.ground
+    for i in range(len(masses)):
+        r = radii[i]
+        if asleep[i] or shell[i] == SHELTERED or positions[i, 2] > highest + r:
             if on_ground[i]:
                 on_ground[i] = 0
                 forget(springs, i)
@@ -96,16 +98,14 @@ def press_ground(state: State, site: Site, highest: float, law: Law, dt: float) 
                 forget(springs, i)
             continue
         on_ground[i] = 1
-        state.ground[i] = place
+        ground[i] = place
         if gap < LEAST_GAP * r and not near_plate[i]:  # never into a plate
             lift = min(LEAST_GAP * r - gap, LIFT * r)
             for a in range(3):
                 positions[i, a] += lift * normal[a]
         velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
         spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-        force, torque = wall_contact(
-            springs, i, normal, min(max(gap, 0.0), r), velocity, spin, state.masses[i], r, law, dt
-        )
+        force, torque = wall_contact(springs, i, normal, min(max(gap, 0.0), r), velocity, spin, masses[i], r, law, dt)
         for a in range(3):
-            state.forces[i, a] += force[a]
-            state.torques[i, a] += torque[a]
+            forces[i, a] += force[a]
+            torques[i, a] += torque[a]

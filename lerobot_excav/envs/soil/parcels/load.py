@@ -56,29 +56,31 @@ def find_load(state: State, tool: ToolPath) -> tuple[float, float, float, int]:
     first, last = tool.profile[0], tool.profile[len(tool.profile) - 1]
     length = math.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2)
     mass, energy, flowing, touching = 0.0, 0.0, 0.0, 0
-    for i in range(len(state.masses)):
-        if state.asleep[i]:
+    positions, velocities, masses, radii = state.positions, state.velocities, state.masses, state.radii
+    asleep, load, ground, linear, planes = state.asleep, state.load, state.ground, tool.linear, tool.planes
+    for i in range(len(masses)):
+        if asleep[i]:
             continue
-        p = (state.positions[i, 0], state.positions[i, 1], state.positions[i, 2])
+        p = (positions[i, 0], positions[i, 1], positions[i, 2])
         q = to_tool(position, rotation, p[0], p[1], p[2])
         turning = cross(w, (p[0] - position[0], p[1] - position[1], p[2] - position[2]))
         speed = 0.0
         for a in range(3):
-            speed += (state.velocities[i, a] - tool.linear[a] - turning[a]) ** 2
-        above = -inside_depth(tool.planes[:1], 0, q)
-        state.load[i] = 0
+            speed += (velocities[i, a] - linear[a] - turning[a]) ** 2
+        above = -inside_depth(planes[:1], 0, q)
+        load[i] = 0
         if above <= 0.0:
-            state.load[i] = 1 if inside_depth(tool.planes, 1, q) > 0.0 else 0
-        elif above < LARGEST_HEAP_M and up > LOOKS_UP and abs(q[1]) < tool.half_width + state.radii[i]:
+            load[i] = 1 if inside_depth(planes, 1, q) > 0.0 else 0
+        elif above < LARGEST_HEAP_M and up > LOOKS_UP and abs(q[1]) < tool.half_width + radii[i]:
             along = (q[0] - first[0]) * (last[0] - first[0]) + (q[2] - first[1]) * (last[1] - first[1])
-            over = abs(along / length - 0.5 * length) < 0.5 * length + state.radii[i]
-            state.load[i] = 1 if over and speed < LEAVING_M_S**2 else 0
-        if state.load[i]:
-            mass += state.masses[i]
-            energy += state.masses[i] * speed
+            over = abs(along / length - 0.5 * length) < 0.5 * length + radii[i]
+            load[i] = 1 if over and speed < LEAVING_M_S**2 else 0
+        if load[i]:
+            mass += masses[i]
+            energy += masses[i] * speed
             if speed > FLOWING_SPEED_M_S**2:
-                flowing += state.masses[i]
-            if state.ground[i] != TOUCHES_NOTHING:
+                flowing += masses[i]
+            if ground[i] != TOUCHES_NOTHING:
                 touching = 1
     if mass == 0.0:
         return 0.0, 0.0, 0.0, touching

@@ -217,9 +217,10 @@ def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> N
     positions, velocities, spins = state.positions, state.velocities, state.spins
     plates = state.plate_springs.shape[1]
     springs = state.plate_springs.reshape((-1, SPRINGS))
-    for i in range(len(state.masses)):
-        r, z = state.radii[i], positions[i, 2]
-        if state.asleep[i] or z > box.top_z + 2.0 * r:  # 1 r more: see to old contacts
+    masses, radii, asleep, forces, torques = state.masses, state.radii, state.asleep, state.forces, state.torques
+    for i in range(len(masses)):
+        r, z = radii[i], positions[i, 2]
+        if asleep[i] or z > box.top_z + 2.0 * r:  # 1 r more: see to old contacts
             continue
         u, v = to_box(box, positions[i, 0], positions[i, 1])
         if abs(u) > box.half_x + 2.0 * r or abs(v) > box.half_y + 2.0 * r:
@@ -240,7 +241,7 @@ def press_box(state: State, first: int, box: BoxWalls, law: Law, dt: float) -> N
             velocity = (velocities[i, 0], velocities[i, 1], velocities[i, 2])
             velocity = keep_out(positions, velocities, i, normal, gap, r, velocity, dt)
             spin = (spins[i, 0], spins[i, 1], spins[i, 2])
-            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, state.masses[i], r, law, dt)
+            force, torque = wall_contact(springs, row, normal, gap, velocity, spin, masses[i], r, law, dt)
             for a in range(3):
-                state.forces[i, a] += force[a]
-                state.torques[i, a] += torque[a]
+                forces[i, a] += force[a]
+                torques[i, a] += torque[a]

@@ -1,5 +1,6 @@
 """What a step needs is compiled before `reset` returns."""
 
+import os
 import subprocess
 import sys
 
@@ -29,7 +30,6 @@ over = False
 while not over:
     *_, terminated, truncated, info = env.step(operator.act(env))
     over = terminated or truncated
-swing = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 env.reset(options={"scene_id": 8, "target_id": 0})
 for _ in range(30 if sys.argv[1] == "agent_pos" else 3):  # with the lowered bucket into the box
     env.step(np.array([1.0, -1.0, 0.0, 0.0], np.float32))
@@ -39,8 +39,6 @@ print(info["task_state"][2] > 100.0, names)
 
 def first_episode(cache, obs_type):
     environment = {"NUMBA_CACHE_DIR": str(cache), "MUJOCO_GL": "egl", "OMP_NUM_THREADS": "1"}
-    import os
-
     command = [sys.executable, "-c", FIRST_EPISODE, obs_type]
     return subprocess.run(command, env={**os.environ, **environment}, text=True, capture_output=True, check=True)
 
