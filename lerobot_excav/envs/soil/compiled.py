@@ -62,6 +62,8 @@ def kernel[F: Callable[..., Any]](function: F) -> F:
     chosen = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = chosen or str(_CACHE)
     try:
-        return cast(F, numba.njit(cache=True, fastmath=False, parallel=False, nogil=True, error_model="numpy")(function))
+        return cast(
+            F, numba.njit(cache=True, fastmath=False, parallel=False, nogil=True, error_model="numpy")(function)
+        )
     finally:
         numba.config.CACHE_DIR = chosen

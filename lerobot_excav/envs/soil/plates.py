@@ -20,7 +20,7 @@ class OuterFaces:
     """Pieces of the bottom and the back of a bucket and of its blunt cutting edge, in its frame.
 
     Each is a strip from a start to an end, straight across the bucket. Both lie on the inside of the plate; the ground
-    meets the plate at one thickness along the normal from there.
+    meets the plate at one thickness along the normal from there. The edge is a line, as thick as the plate.
     """
 
     starts_t: Array  # (m, 3) [m]
@@ -52,14 +52,15 @@ class OuterFaces:
     @property
     def areas_m2(self) -> Array:
         """(m,) area of each piece."""
-        return np.asarray(np.linalg.norm(self.ends_t - self.starts_t, axis=1) * self.width_m)
+        lengths = np.linalg.norm(self.ends_t - self.starts_t, axis=1)
+        return np.where(self.is_edge, PLATE_THICKNESS_M, lengths) * self.width_m
 
 
 def _edge_piece(profile_t: Array) -> tuple[Array, Array, Array]:
     """Return start, end and normal (x, z) of the blunt end of the bottom plate."""
     along = profile_t[1] - profile_t[0]
     along = along / np.linalg.norm(along)
-    return profile_t[0], profile_t[0] + PLATE_THICKNESS_M * np.array([along[1], -along[0]]), -along
+    return profile_t[0], profile_t[0], -along
 
 
 def _shell_pieces(start: Array, end: Array) -> list[tuple[Array, Array, Array]]:

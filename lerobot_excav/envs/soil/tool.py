@@ -13,7 +13,6 @@ from lerobot_excav.errors import require
 _CONVEX_TOLERANCE_M2 = 1e-9
 
 
-
 def _fixed(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return a read-only float64 copy of the right shape with finite values."""
     array = np.array(value, dtype=np.float64)

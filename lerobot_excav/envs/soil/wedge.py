@@ -17,9 +17,9 @@ from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 _WEDGE_REACH_M = 4.0
 """Longest failure plane followed through the height field."""
 
-_TRIAL_STEP_RAD = math.radians(5.0)
-_TRIALS = 9
-"""Trial planes rise by 0 to 40 degrees; on level ground the tabulated angle is the best and is tried as well."""
+_TRIALS_RAD = tuple(math.radians(a) for a in (0.0, 2.0, 4.0, 7.0, 10.0, 14.0, 18.0, 23.0, 28.0, 34.0, 40.0))
+"""Rise of the trial planes. On level ground the tabulated angle is the best one and is tried as well; before a heap
+flat planes are, which differ most."""
 
 _STEEPEST_RAD = math.radians(179.0)
 """Largest sum of rake, wall friction, failure and friction angle; at 180 degrees a wedge locks."""
@@ -111,10 +111,10 @@ def passive_force(
         return 0.0, 0.0
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
     leaning = rake + soil.steel_friction + soil.friction
-    failures, balances = np.zeros(_TRIALS + 1), np.zeros(_TRIALS + 1)
+    failures, balances = np.zeros(len(_TRIALS_RAD) + 1), np.zeros(len(_TRIALS_RAD) + 1)
     failures[0] = failure_angle_at(soil.table, rake)
-    for j in range(_TRIALS):
-        failures[j + 1] = j * _TRIAL_STEP_RAD
+    for j in range(len(_TRIALS_RAD)):
+        failures[j + 1] = _TRIALS_RAD[j]
     for j in range(len(failures)):
         if leaning + failures[j] > _STEEPEST_RAD:
             failures[j] = failures[0]
