@@ -43,6 +43,7 @@ $(READY): pyproject.toml uv.lock
 	@echo "Installing into $(VENV): LeRobot, PyTorch and MuJoCo, several GB the first time. Each package is named as it loads."
 	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
 	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --inexact
+	@$(RUN)/lerobot-excav warmup
 	@touch $@
 
 demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)

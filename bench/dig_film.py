@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
-from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.machines.excavator.viewing import WorksiteView
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.evaluation.video import write_video
@@ -43,7 +43,8 @@ def pictures(height: int = 480, width: int = 848) -> Iterator[NDArray[np.uint8]]
     operator = DigOperator(rng=np.random.default_rng(0))
     operator.reset(env)
     soil = env.worksite.soil
-    renderer = WorksiteRenderer(env.worksite, height=height, width=width)
+    view = WorksiteView(env.worksite, height=height, width=width)
+    view.mark(env.target.corners_w)
     wait = 0
     for _ in range(_LONGEST_S * TICKS_PER_SECOND):
         if env.cycle.is_complete:
@@ -52,9 +53,9 @@ def pictures(height: int = 480, width: int = 848) -> Iterator[NDArray[np.uint8]]
         stride = ticks_per_picture(operator.phase, payload_kg=soil.payload_mass_kg, airborne_kg=soil.airborne_mass_kg)
         wait = min(wait, stride) - 1
         if wait <= 0:
-            yield renderer.render("side")
+            yield view.render("side")
             wait = stride
-    renderer.close()
+    view.close()
 
 
 if __name__ == "__main__":

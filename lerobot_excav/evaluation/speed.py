@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.simulation import play_demonstration
+from lerobot_excav.setting import declared_settings
 
 
 class Measurement(NamedTuple):
@@ -30,6 +31,23 @@ def measure_environment(settings: DemonstrationSettings) -> list[Measurement]:
             frames += play_demonstration(settings, pair, with_images=with_images).length
         rate = frames / (time.perf_counter() - start)
         results += [Measurement(name, rate, "steps/s"), Measurement(name, rate / settings.env.fps, "x real time")]
+    return results
+
+
+def measure_cycles(settings: DemonstrationSettings) -> list[Measurement]:
+    """Measure the operator's cycles alone at every fidelity: simulated time over processor time, without pictures."""
+    levels = declared_settings(type(settings.env)).get("fidelity")
+    results = []
+    for fidelity in (None,) if levels is None else levels.values or ():
+        env = settings.env if fidelity is None else replace(settings.env, fidelity=fidelity)
+        played = replace(settings, env=env)
+        play_demonstration(played, played.pairs()[0], with_images=False)  # the first cycle loads or compiles kernels
+        start, frames = time.process_time(), 0
+        for pair in played.pairs():
+            frames += play_demonstration(played, pair, with_images=False).length
+        name = "operator's cycle" if fidelity is None else f"operator's cycle, {fidelity}"
+        seconds = time.process_time() - start
+        results.append(Measurement(name, frames / played.env.fps / seconds, "x real time"))
     return results
 
 
@@ -73,6 +91,7 @@ def measures(settings: DemonstrationSettings, *, workers: int) -> dict[str, Call
     """Return what can be measured, by name."""
     return {
         "environment": lambda: measure_environment(settings),
+        "cycle": lambda: measure_cycles(settings),
         "writing": lambda: measure_writing(settings),
         "demos": lambda: measure_demonstrations(settings, workers=workers),
     }

@@ -1,12 +1,15 @@
 """Measure how fast this machine simulates, writes and records a task.
 
-The repository has more: `python -m bench.soil` and `python -m bench.policy` time soil and policies alone.
+The repository has more: `python -m bench.operator_cycle` times the parts of a cycle, `python -m bench.soil` the soil
+alone, and `python -m bench.policy` policies.
 
 Examples:
   lerobot-excav bench
       the excavator, three scenes
   lerobot-excav bench --env.type=fr5_grasp --scenes=1 --targets=1 --json=outputs/machine.json
       the arm, quickly; the numbers also go to a file
+  lerobot-excav bench --only=cycle
+      the operator's cycles at every fidelity, in processor time
   lerobot-excav bench --only=environment --env.soil=gravel --env.fidelity=fine
       other soil, finer
 """
@@ -24,7 +27,7 @@ from lerobot_excav.scripts.demos import WorkArguments, played
 from lerobot_excav.setting import setting, with_default
 from lerobot_excav.whole_file import write_whole
 
-MEASURES = ("environment", "writing", "demos")
+MEASURES = ("environment", "cycle", "writing", "demos")
 
 
 @dataclass(kw_only=True)

@@ -18,6 +18,7 @@ COMMANDS = {
     "report": "make the table of one or more evaluations, with intervals and comparisons",
     "export": "write a small copy of a trained policy, with a model card",
     "bench": "measure how fast this machine simulates and records",
+    "warmup": "compile the simulation ahead of the first episode",
 }
 
 EPILOG = """\

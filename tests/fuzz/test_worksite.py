@@ -58,7 +58,10 @@ def soil_problems(soil, mass_kg):
 
 def reaction_problems(reaction):
     """Return what is not finite in an answer of the soil, by name."""
-    names = ("force_w_n", "torque_w_nm", "payload_mass_kg", "payload_com_t")
+    names = (
+        *("force_w_n", "torque_w_nm", "payload_mass_kg", "payload_com_t"),
+        *("impulse_w_ns", "angular_impulse_w_nms"),
+    )
     values = {name: getattr(reaction, name) for name in names}
     values |= {name: getattr(reaction.patches, name) for name in ("points_w", "normals_w", "limits_n")}
     return [name for name, value in values.items() if not np.isfinite(value).all()]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
-from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters, relax
+from lerobot_excav.envs.soil import PRESETS, Soil, SoilParameters
 from validation import Array
 from validation.soil.arrangement import cylinder
 from validation.soil.resting import steps_until_rest
@@ -30,7 +30,7 @@ class Collapse(NamedTuple):
     height: float  # final height over initial radius
     stop_time: float  # until the radius is within 2 % of its last value, over sqrt(h0 / g)
     parcel_count: float
-    cone_run_out: float  # of the same column in a height field that only relaxes
+    cone_run_out: float  # of the cone at repose of the same volume
     simulated_s: float  # until all of it was at rest
 
 
@@ -63,13 +63,12 @@ def collapse(parameters: SoilParameters, aspect: float, *, fidelity: str, seed: 
 
 
 def _cone_radius(soil: Soil, radius_m: float, height_m: float) -> float:
-    """Return the mass radius [m] of the same column after relaxation of a height field alone."""
+    """Return the mass radius [m] of the cone at repose that has the volume of a column."""
     radii_m = np.hypot(*np.meshgrid(soil.x_w, soil.y_w, indexing="ij"))
-    inside = radii_m <= radius_m
-    cell = float(soil.x_w[1] - soil.x_w[0])
-    volume = math.pi * radius_m**2 * height_m
-    rested = relax(inside * volume / (inside.sum() * cell**2), cell, soil.parameters.slope_tan)
-    return share_radius(radii_m.ravel(), rested.ravel(), MASS_SHARE)
+    slope_tan = soil.parameters.slope_tan
+    foot_m = math.cbrt(3.0 * radius_m**2 * height_m / slope_tan)
+    cone = np.maximum(0.0, slope_tan * (foot_m - radii_m))
+    return share_radius(radii_m.ravel(), cone.ravel(), MASS_SHARE)
 
 
 def share_radius(radii_m: Array, masses_kg: Array, share: float) -> float:

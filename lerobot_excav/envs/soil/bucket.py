@@ -19,6 +19,10 @@ from lerobot_excav.errors import require
 LARGEST_MOTION_M = 1.0
 """Motion per step above which the tool must have been placed by hand: 50 m/s at a tick of 0.02 s."""
 
+FILLING_UP = 0.1
+"""Around its heaped volume, over this share of it, a bucket goes from taking all that meets the opening to taking none:
+were it full at once, the heap ahead and the force would jump (guess)."""
+
 _NO_WINDOW = Window(0, 0, 0, 0)
 
 
@@ -87,8 +91,8 @@ class Bucket:
     def move(self, tool: Tool, field: HeightField, floor_depth_m: float, load_m3: float) -> tuple[float, float]:
         """Sweep the bucket from its last pose to this one.
 
-        It takes in soil up to its heaped volume, `load_m3` of it being there already (as in the ground), and pushes the
-        rest ahead; the field changes in place. A tool that was not there in the last step cuts nothing.
+        It takes in soil up to about its heaped volume, `load_m3` of it being there already (as in the ground), and
+        pushes the rest ahead; the field changes in place. A tool that was not there in the last step cuts nothing.
 
         Returns the volumes [m3] that entered and that were pushed over the border.
 
@@ -106,7 +110,7 @@ class Bucket:
         volumes_m3 = (0.0, 0.0)
         if before is not None:
             most = heaped_volume_m3(geometry, self._parameters.slope_tan) / self._parameters.swell
-            room = max(0.0, most - load_m3 - self.waiting_m3)
+            room = max(0.0, (1.0 + 0.5 * FILLING_UP) * most - load_m3 - self.waiting_m3), FILLING_UP * most
             steps = max(1, math.ceil(motion_m / (self._fidelity.substep_cells * min(field.grid.cell_m))))
             path = poses_between(before, pose, steps)
             volumes_m3 = self._sweep(geometry, path, field, self.intake, room)
@@ -132,12 +136,17 @@ class Bucket:
         return points, masses
 
     def _sweep(
-        self, geometry: ToolGeometry, path: Iterator[tuple[Pose, Pose]], field: HeightField, intake: Intake, room: float
+        self,
+        geometry: ToolGeometry,
+        path: Iterator[tuple[Pose, Pose]],
+        field: HeightField,
+        intake: Intake,
+        room: tuple[float, float],
     ) -> tuple[float, float]:
-        entered, lost = 0.0, 0.0
+        (most, fade), entered, lost = room, 0.0, 0.0
         for start, end in path:
             motion = geometry.planes_t, start, end, _window(geometry, end, field)
-            intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
+            intaking = self._fidelity.vertical_bins, max(0.0, most - entered), fade, intake.bins
             more, over = cut(field.heights, field.active, field.grid, *motion, *intaking)
             entered += more
             lost += over

@@ -3,11 +3,16 @@
 import ast
 import hashlib
 import os
-from collections.abc import Callable
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
 import numba
+from numba.core import event
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -52,18 +57,66 @@ def _cache_directory() -> Path:
 
 _CACHE = _cache_directory()
 
+# Strict floating point (no reassociation) and one thread: a soil step is a pure function of its inputs. Other threads
+# of Python may run meanwhile. Without Python's own error model a division by zero gives infinity, as in NumPy, and
+# every other division the same bits with less code.
+_OPTIONS = {"fastmath": False, "parallel": False, "nogil": True, "error_model": "numpy"}
+
 
 def kernel[F: Callable[..., Any]](function: F) -> F:
     """Compile a function to serial machine code that gives the same bits on every run.
 
-    Strict floating point (no reassociation) and one thread: a soil step is a pure function of its inputs.
     The compiled code is cached on disk, beside the source where that can be written, so only the first run compiles.
+    Where no folder can be written, every process compiles, and says so once.
     """
     chosen = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = chosen or str(_CACHE)
     try:
+<<<<<<< HEAD
         return cast(
             F, numba.njit(cache=True, fastmath=False, parallel=False, nogil=True, error_model="numpy")(function)
         )
+=======
+        return cast(F, numba.njit(cache=True, **_OPTIONS)(function))
+    except RuntimeError as error:
+        if "no locator" not in str(error):
+            raise
+        _say_that_nothing_is_kept(numba.config.CACHE_DIR)
+        return cast(F, numba.njit(**_OPTIONS)(function))
+>>>>>>> main
     finally:
         numba.config.CACHE_DIR = chosen
+
+
+@cache
+def _say_that_nothing_is_kept(folder: str) -> None:
+    print(
+        f"Compiled code of the simulation cannot be kept: {folder} cannot be written. Every start compiles it again, "
+        "which takes about a minute; set NUMBA_CACHE_DIR to a folder that can be written.",
+        file=sys.stderr,
+    )
+
+
+class _Announcement(event.Listener):  # type: ignore[misc]  # numba is untyped here
+    """Says what happens when a kernel is compiled for the first time."""
+
+    def __init__(self) -> None:
+        self.is_made = False
+
+    def on_start(self, event: Any) -> None:
+        if not self.is_made:
+            self.is_made = True
+            print("Compiling the simulation: about a minute, this once ...", file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        """Stay quiet: hundreds of functions are compiled."""
+
+
+@contextmanager
+def announced() -> Iterator[None]:
+    """Tell on stderr if something is compiled inside, and when that is over; code from the cache needs no words."""
+    announcement, start = _Announcement(), time.perf_counter()
+    with event.install_listener("numba:compile", announcement):
+        yield
+    if announcement.is_made:
+        print(f"Compiled in {time.perf_counter() - start:.0f} s.", file=sys.stderr, flush=True)

@@ -10,9 +10,9 @@ import math
 from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
+from lerobot_excav.envs.soil.layer import mark_around
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Bins, gather
-from lerobot_excav.envs.soil.relaxation import mark_around
 
 OPENING = 0
 """Index of the opening among the planes of a tool."""
@@ -23,8 +23,8 @@ _LEVEL = 0.3
 """A face whose outward normal has a smaller horizontal part pushes soil along the motion instead (guess)."""
 
 _SHIFT_X, _SHIFT_Y = math.sqrt(2.0) - 1.0, 0.5 * (math.sqrt(5.0) - 1.0)
-"""By how much of a cell the line of a column moves from row to row. Multiples of the golden ratio are spread most evenly
-(Weyl's equidistribution); the other is far from it, so that rows along the diagonals are spread evenly too."""
+"""By how much of a cell the line of a column moves from row to row. Multiples of an irrational number are spread evenly
+over a cell (Weyl's equidistribution), and so are those of the difference and the sum, along the diagonals (guess)."""
 
 
 @kernel
@@ -142,6 +142,12 @@ def push_direction(planes: Array, rotation: Array, face: int, before: Vector, no
 
 
 @kernel
+def _taken(volume: float, room: float, fade: float) -> float:
+    """Return how much of a volume before the opening enters [m3]."""
+    return min(volume * min(1.0, max(0.0, room) / fade), room)
+
+
+@kernel
 def cut_column(
     heights: Array,
     active: Flags,
@@ -153,6 +159,7 @@ def cut_column(
     j: int,
     samples: int,
     room: float,
+    fade: float,
     intake: Bins,
 ) -> tuple[float, float]:
     """Clear one column of the soil inside the bucket; return the volumes that entered and that left the grid."""
@@ -173,7 +180,7 @@ def cut_column(
         face = crossed_face(planes, before, now)
         if face == ALREADY_INSIDE:
             face = top  # it fell in from above
-        taken = min(share, room - entered) if face == OPENING else 0.0
+        taken = _taken(share, room - entered, fade) if face == OPENING else 0.0
         if taken > 0.0:
             gather(intake, now[0], now[1], now[2], taken)
             entered += taken
@@ -183,7 +190,7 @@ def cut_column(
     if top == OPENING:
         # What was above the opening has sunk to where it is open below. It must not wait for the next sub-step: the
         # plate may have risen above it by then.
-        taken = min(max(0.0, heights[i, j] - low) * area, room - entered)
+        taken = _taken(max(0.0, heights[i, j] - low) * area, room - entered, fade)
         if taken > 0.0:
             heights[i, j] = max(low, heights[i, j] - taken / area)
             now = to_tool(pose_now.position, pose_now.rotation, x, y, low)
@@ -203,19 +210,21 @@ def cut(
     window: Window,
     samples: int,
     room: float,
+    fade: float,
     intake: Bins,
 ) -> tuple[float, float]:
     """Move the bucket through the soil by one sub-step; heights [m], avalanche marks and `intake` change in place.
 
     The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
-    can still take a volume `room` [m3]. Returns the volumes [m3] that entered and that were pushed over the border.
+    can still take a volume `room` [m3], and over the last `fade` [m3] of it ever less of what meets the opening.
+    Returns the volumes [m3] that entered and that were pushed over the border.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
+                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, fade, intake
                 )
                 entered += more
                 lost += over

@@ -9,7 +9,6 @@ class Fidelity:
 
     vertical_bins: int  # samples along the height of a column inside the bucket
     substep_cells: float  # largest motion of the tool per sub-step, in cells
-    sweeps_per_tick: int  # avalanche sweeps per `TICK_S`; more let slopes come to rest sooner
     force_slices: int  # lateral slices of the cutting edge in the force model
     parcel_radius_m: float  # radius of one parcel
     substeps_per_tick: int  # sub-steps of the parcels' motion per `TICK_S`
@@ -20,7 +19,6 @@ FIDELITIES = {
     "fast": Fidelity(
         vertical_bins=2,
         substep_cells=1.0,
-        sweeps_per_tick=6,
         force_slices=4,
         parcel_radius_m=0.06,
         substeps_per_tick=14,
@@ -29,7 +27,6 @@ FIDELITIES = {
     "standard": Fidelity(
         vertical_bins=4,
         substep_cells=0.5,
-        sweeps_per_tick=8,
         force_slices=8,
         parcel_radius_m=0.048,
         substeps_per_tick=16,
@@ -38,7 +35,6 @@ FIDELITIES = {
     "fine": Fidelity(
         vertical_bins=8,
         substep_cells=0.25,
-        sweeps_per_tick=12,
         force_slices=12,
         parcel_radius_m=0.036,
         substeps_per_tick=30,

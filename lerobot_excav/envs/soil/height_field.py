@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 
 from lerobot_excav.envs.soil.arrays import Array, Bools, Flags
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.relaxation import mark_around, sweep
+from lerobot_excav.envs.soil.flow import flow
+from lerobot_excav.envs.soil.layer import Ground, Layer, Window, mark_around
 from lerobot_excav.errors import require
 
 
@@ -33,23 +34,6 @@ class Grid(NamedTuple):
     def cell_m(self) -> tuple[float, float]:
         """Cell sizes [m]."""
         return self.dx, self.dy
-
-
-class Window(NamedTuple):
-    """Ranges of the columns of a height field: from i0 to before i1 along x, from j0 to before j1 along y."""
-
-    i0: int
-    i1: int
-    j0: int
-    j1: int
-
-    def union(self, other: "Window") -> "Window":
-        """Return the smallest window that holds both; an empty one does not count."""
-        if self.i1 <= self.i0 or self.j1 <= self.j0:
-            return other
-        if other.i1 <= other.i0 or other.j1 <= other.j0:
-            return self
-        return Window(min(self.i0, other.i0), max(self.i1, other.i1), min(self.j0, other.j0), max(self.j1, other.j1))
 
 
 @kernel
@@ -114,18 +98,19 @@ class HeightField:
 
     Attributes:
         heights: (nx, ny) heights above the floor [m], index along x first.
-        active: (nx, ny) columns that the next avalanche sweep looks at.
+        layer: The state of its avalanches; its arrays `heights`, `active` and `ceiling` are those of the field.
+        active: (nx, ny) columns that the next avalanche step looks at.
         ceiling: (nx, ny) heights up to which soil can avalanche [m]: the underside of the bucket, else infinite.
         grid: Centre of the first cell and cell sizes.
     """
 
     def __init__(self, shape: tuple[int, int], cell_m: tuple[float, float], border_height_m: float) -> None:
         """Make an empty field centred at the origin of its plane; soil above the border height runs off it."""
-        self.heights: Array = np.zeros(shape)
-        self.active: Flags = np.zeros(shape, dtype=np.uint8)
-        self.ceiling: Array = np.full(shape, np.inf)
+        self.layer = Layer.empty(shape)
+        self.heights: Array = self.layer.heights
+        self.active: Flags = self.layer.active
+        self.ceiling: Array = self.layer.ceiling
         self.grid = Grid.centred(shape, float(cell_m[0]), float(cell_m[1]))
-        self._delta: Array = np.zeros(shape)
         self._border_height_m = border_height_m
         self._at_rest = True
 
@@ -157,6 +142,9 @@ class HeightField:
         require(finite, "heights_m holds values that are not finite; give metres above the floor.")
         require(above, f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.")
         self.heights[:] = new
+        self.layer.bed[:] = new
+        self.layer.speeds[:] = 0.0
+        self.layer.flux[:] = 0.0
         self.active[:] = 1
         self.ceiling[:] = np.inf
         self._at_rest = False
@@ -194,15 +182,11 @@ class HeightField:
         j0, j1 = int(np.ceil((low[1] - y0) / dy)), int(np.floor((high[1] - y0) / dy)) + 1
         return Window(min(max(i0, 0), nx), min(max(i1, 0), nx), min(max(j0, 0), ny), min(max(j1, 0), ny))
 
-    def relax(self, sweeps: int, slope_tan: float) -> float:
-        """Let soil avalanche for some sweeps; return the volume [m3] that ran off over the border."""
-        lost = 0.0
-        for _ in range(sweeps):
-            if self._at_rest:
-                break
-            over, changed = sweep(
-                self.heights, self._delta, self.active, self.ceiling, self.grid.cell_m, slope_tan, self._border_height_m
-            )
-            lost += over
-            self._at_rest = changed == 0
+    def flow(self, dt_s: float, slope_tan: float) -> float:
+        """Let soil avalanche for some time; return the volume [m3] that ran off over the border."""
+        if self._at_rest:
+            return 0.0
+        ground = Ground(slope_tan, self.grid.dx, self.grid.dy, self._border_height_m)
+        lost, moves = flow(self.layer, ground, dt_s)
+        self._at_rest = not moves
         return lost * self.cell_area_m2

@@ -56,18 +56,13 @@ def turned(rotation: Array, turn: Array, share: float) -> Array:
         return rotation.copy()
     x, y, z = turn[0] / whole, turn[1] / whole, turn[2] / whole
     sin, versine = math.sin(angle), 1.0 - math.cos(angle)
-    step = np.array(
-        [
-            [1.0 - versine * (y * y + z * z), versine * x * y - sin * z, versine * x * z + sin * y],
-            [versine * x * y + sin * z, 1.0 - versine * (x * x + z * z), versine * y * z - sin * x],
-            [versine * x * z - sin * y, versine * y * z + sin * x, 1.0 - versine * (x * x + y * y)],
-        ]
-    )
+    first = (1.0 - versine * (y * y + z * z), versine * x * y - sin * z, versine * x * z + sin * y)
+    second = (versine * x * y + sin * z, 1.0 - versine * (x * x + z * z), versine * y * z - sin * x)
+    third = (versine * x * z - sin * y, versine * y * z + sin * x, 1.0 - versine * (x * x + y * y))
     result = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
-            for c in range(3):
-                result[a, b] += rotation[a, c] * step[c, b]
+            result[a, b] = rotation[a, 0] * first[b] + rotation[a, 1] * second[b] + rotation[a, 2] * third[b]
     return result
 
 

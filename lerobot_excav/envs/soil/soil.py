@@ -157,9 +157,8 @@ class Soil:
         geometry = None if tool is None else tool.geometry
         self._out_of_bounds_kg += self._loose.step(geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0)
         self._load_kg, com_t = self._weighed_load(tool)
-        sweeps = max(1, round(self.fidelity.sweeps_per_tick * dt_s / TICK_S))
         for field in (self._field, self._box_field):
-            self._out_of_bounds_m3 += field.relax(sweeps, self.parameters.slope_tan)
+            self._out_of_bounds_m3 += field.flow(dt_s, self.parameters.slope_tan)
         return self._reaction(tool, dt_s, com_t)
 
     def _reaction(self, tool: Tool | None, dt_s: float, com_t: Array) -> Reaction:

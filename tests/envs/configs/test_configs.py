@@ -103,9 +103,11 @@ def test_every_setting_reaches_the_environment(spec):
         "mask_noise_px": 3,
         "target_overlay": True,
     }
-    vector = config_of(spec, **settings).create_envs(1)[spec.env_type][0]
+    rendered = {"render_height": 64, "render_width": 80, "render_camera": "main"}
+    vector = config_of(spec, **settings, **rendered).create_envs(1)[spec.env_type][0]
     env = vector.envs[0].unwrapped
     assert {name: getattr(env.settings, name) for name in settings} == settings
+    assert {name: getattr(env.render_settings, name) for name in rendered} == rendered
     assert (env.fps, env.episode_length, env.task) == (25, 30, spec.id)
     vector.close()
 

@@ -28,6 +28,15 @@ def dig(bucket, field, load_m3=0.0):
     return sum(bucket.move(dragged(tick), field, 0.0, load_m3)[0] for tick in range(30))
 
 
+def fresh_cut(load_m3):
+    """Return the volume that enters a bucket with a load over 2 cm, in the middle of a drag."""
+    bucket, field = fresh()
+    for tick in range(15):
+        bucket.move(dragged(tick), field, 0.0, 0.0)
+        bucket.births(all_of_it=True, rng=np.random.default_rng(0))
+    return bucket.move(dragged(15), field, 0.0, load_m3)[0]
+
+
 @pytest.mark.parametrize(("length", "width"), [(0.5, 0.72), (0.72, 0.72), (0.9, 0.6)])
 @pytest.mark.parametrize("slope", [SAND.slope_tan, 1.0])
 def test_the_heap_over_a_level_opening_is_a_hip_roof(length, width, slope):
@@ -62,9 +71,13 @@ def test_what_enters_waits_and_what_waits_is_born(all_of_it):
         assert len(bucket.births(all_of_it=True, rng=np.random.default_rng(0))[0]) == 0
 
 
-@pytest.mark.parametrize("room", [0.005, 0.0])
-def test_a_bucket_takes_no_more_than_its_heap_holds(room):
-    assert dig(*fresh(), load_m3=heaped_volume_m3(BUCKET, SAND.slope_tan) - room) == pytest.approx(room)
+def test_a_bucket_takes_ever_less_around_its_heaped_volume_and_then_none():
+    heap = heaped_volume_m3(BUCKET, SAND.slope_tan)
+    shares = (0.5, 0.9, 0.975, 1.0, 1.025, 1.05, 1.2)
+    entered = [fresh_cut(share * heap) for share in shares]
+    assert entered[0] == entered[1] > 0.0
+    assert entered[2:] == pytest.approx([share * entered[0] for share in (0.75, 0.5, 0.25, 0.0, 0.0)], rel=0.1)
+    assert dig(*fresh(), load_m3=heap) == pytest.approx(0.05 * heap, rel=0.05)  # nearly all that is left, however far
 
 
 def test_a_tool_that_is_described_again_in_every_step_is_the_same_bucket():

@@ -1,8 +1,13 @@
 import importlib
 import os
+import shutil
+import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lerobot_excav.envs.soil import compiled
@@ -103,3 +108,62 @@ def test_a_cache_directory_that_was_chosen_is_left_alone(package, monkeypatch, t
     result(monkeypatch)
     assert compiled.numba.config.CACHE_DIR is chosen
     assert list(Path(chosen).rglob("*.nbi"))
+
+
+PROBE = """
+from lerobot_excav.envs.soil.compiled import kernel
+
+@kernel
+def added(x):
+    return x + 1.0
+
+@kernel
+def twice(x):
+    return 2.0 * x
+
+print(added(1.0), twice(1.0))
+"""
+
+
+def test_where_nothing_can_be_written_code_is_compiled_anyway_and_it_is_said_once(tmp_path):
+    """A folder that holds a file in place of `__pycache__` cannot keep code, whoever the user is."""
+    shutil.copytree(
+        Path(compiled.__file__).parents[2], tmp_path / "lerobot_excav", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    (tmp_path / "probe.py").write_text(PROBE)
+    for folder in [tmp_path, *(path for path in tmp_path.rglob("*") if path.is_dir())]:
+        (folder / "__pycache__").write_text("")
+    nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null/cache", "IPYTHONDIR": "/dev/null"}
+    environment = {**os.environ, **nowhere, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, str(tmp_path / "probe.py")]
+    done = subprocess.run(command, env=environment, text=True, capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "2.0 2.0\n"), done.stderr
+    assert done.stderr.count("cannot be kept") == 1
+    assert "set NUMBA_CACHE_DIR to a folder that can be written" in done.stderr
+
+
+def test_other_threads_run_while_a_kernel_works():
+    @compiled.kernel
+    def long_sum(count):
+        total = 0.0
+        for k in range(count):
+            total += np.sqrt(k + total)
+        return total
+
+    long_sum(1)
+    ticks, done = [], threading.Event()
+
+    def count():
+        while not done.is_set():
+            ticks.append(None)
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = len(ticks)
+    long_sum(30_000_000)  # some 0.3 s
+    after = len(ticks)
+    done.set()
+    thread.join()
+    assert after - before > 5

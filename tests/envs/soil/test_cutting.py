@@ -31,7 +31,7 @@ def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     low, high = now.place(BUCKET.corners_t).min(axis=0), now.place(BUCKET.corners_t).max(axis=0)
     window = field.window(np.stack([low - 0.5 * CELL, high + 0.5 * CELL]))
-    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, intake.bins)
+    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, 1e-9, intake.bins)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
@@ -103,7 +103,7 @@ def test_soil_before_the_opening_enters_and_more_bins_see_a_thinner_layer():
     ("pitch_deg", "start", "step", "room", "axis", "least"),
     [
         (-90, (0.0, 0.0, 0.2), (0.05, 0.0, 0.0), 1.0, 0, -0.01),  # behind the back
-        (-150, (-0.3, 0.0, 0.2), (0.0, 0.05, 0.0), 1.0, 1, 0.36),  # beside a side plate
+        (-150, (-0.3, 0.0, 0.5), (0.0, 0.05, 0.0), 1.0, 1, 0.36),  # beside a side plate
         (-120, (0.0, 0.0, 0.2), (-0.05, 0.0, 0.0), 0.0, 0, None),  # a full bucket: before it
     ],
 )

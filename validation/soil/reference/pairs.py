@@ -25,7 +25,10 @@ def neighbours(positions: Array, radii: Array, asleep: Flags) -> set[tuple[int, 
 
 
 def press_pairs(state: State, memory: Memory, law: Law, dt: float, pushes: Array) -> float:
-    """Add the forces of all touching pairs to a state, and what others give to the load to `pushes`; return the fastest hit on a sleeping parcel [m/s]."""
+    """Add the forces of all touching pairs to a state, and what others give to the load to `pushes`.
+
+    Returns the fastest hit on a sleeping parcel [m/s].
+    """
     hit = 0.0
     for i, j in combinations(range(len(state.masses)), 2):
         apart = state.positions[i] - state.positions[j]

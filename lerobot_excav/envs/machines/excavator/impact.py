@@ -17,11 +17,19 @@ class SoilImpact:
         self._model = model
         self._bucket = model.body("bucket").id
         self._jacobian = np.zeros((6, model.nv))
+        self._halves = self._jacobian[:3], self._jacobian[3:]
+        self._force = np.zeros(6)
+        self._acts = False
 
-    def apply(self, data: mujoco.MjData, reaction: Reaction) -> None:
+    def set_reaction(self, reaction: Reaction) -> None:
+        """Take the impulse for the coming tick."""
+        self._force[:3] = reaction.impulse_w_ns
+        self._force[3:] = reaction.angular_impulse_w_nms
+        self._force /= const.TICK_S
+        self._acts = bool(self._force.any())
+
+    def apply(self, data: mujoco.MjData) -> None:
         """Add it to `qfrc_applied`; call it in every substep between `mj_step1` and `mj_step2`."""
-        if not (reaction.impulse_w_ns.any() or reaction.angular_impulse_w_nms.any()):
-            return
-        mujoco.mj_jacBody(self._model, data, self._jacobian[:3], self._jacobian[3:], self._bucket)
-        impulse = np.concatenate([reaction.impulse_w_ns, reaction.angular_impulse_w_nms])
-        data.qfrc_applied[:] += self._jacobian.T @ impulse / const.TICK_S
+        if self._acts:
+            mujoco.mj_jacBody(self._model, data, *self._halves, self._bucket)
+            data.qfrc_applied[:] += self._jacobian.T @ self._force

@@ -83,6 +83,7 @@ class ExcavatorMachine:
         command, model, data = checked_action(action), self.model, self.data
         joint_pos, set_points, applied = data.qpos, data.ctrl, data.qfrc_applied
         self._resistance.set_reaction(reaction, data)
+        self._impact.set_reaction(reaction)
         self.box_contact_force_n = 0.0
         for remaining in range(SUBSTEPS, 0, -1):
             self._payload.approach(reaction.payload_mass_kg, reaction.payload_com_t, remaining)
@@ -90,7 +91,7 @@ class ExcavatorMachine:
             mujoco.mj_step1(model, data)
             applied[:] = 0.0
             self._payload.apply_momentum(data)
-            self._impact.apply(data, reaction)
+            self._impact.apply(data)
             self._resistance.apply(data)
             mujoco.mj_step2(model, data)
             if data.ncon:

@@ -13,11 +13,13 @@ from lerobot_excav.envs.soil.container import Container
 
 TERRAIN_SPACING_M = 0.05
 SOIL_TEXTURE = "soil_paint"
+CLEAR_WALL = "clear_wall"
 PLUMB_LINE = ("plumb_line", "plumb_foot")
 
 # All tuned by eye.
 _HORIZON_RGB = (0.80, 0.85, 0.90)
 _ZENITH_RGB = (0.33, 0.55, 0.83)
+_CLEAR_ALPHA = 0.3
 _SAMPLES, _SHADOW_MAP_PX = 4, 2048
 _PLUMB_RADIUS_M, _FOOT_RADIUS_M = 0.014, 0.09
 _PLUMB_RGBA = (0.95, 0.98, 1.0, 1.0)
@@ -37,6 +39,9 @@ def build_scenery(container: Container) -> mujoco.MjModel:
     _light(spec)
     _spread_ground(spec)
     _paint_terrain(spec)
+    _open_box(spec)
+    horn = spec.body("arm").first_geom()
+    horn.size[1] -= 0.003  # its sides would flicker through those of the beam
     _add_plumb_line(spec)
     return spec.compile()
 
@@ -77,6 +82,14 @@ def _paint_terrain(spec: mujoco.MjSpec) -> None:
     skin.bindpos = [0.0, 0.0, _SUNK_M]
     places: NDArray[np.float32] = np.reshape(skin.vert, (-1, 3))[:, :2]
     skin.texcoord = (places / np.array(DIG_AREA_EXTENT_M) + 0.5).ravel().tolist()
+
+
+def _open_box(spec: mujoco.MjSpec) -> None:
+    """Let the soil in the box be seen through the walls on the side of the cameras."""
+    solid = spec.material("box")
+    spec.add_material(name=CLEAR_WALL, rgba=[*solid.rgba[:3], _CLEAR_ALPHA], specular=solid.specular)
+    for wall in ("box_wall_front", "box_wall_right"):
+        spec.geom(wall).material = CLEAR_WALL
 
 
 def _add_plumb_line(spec: mujoco.MjSpec) -> None:

@@ -9,14 +9,14 @@ from lerobot_excav.envs.soil import Soil
 from lerobot_excav.envs.soil.container import Container
 
 # Tuned by eye.
-_RADIUS_M = 0.036
+_RADIUS_M = 0.046
 _FULL_M = 0.05  # soil raised by so much is covered with grains of full size
 _LEAST_SHARE = 0.15  # smaller grains are not seen
 _SINK = 0.25  # of a radius, into the surface
 
 
 class SettledGrains(NamedTuple):
-    """Grains on the surface: one handful for every column that has received soil."""
+    """Grains on the surface: one handful for every other column that has received soil."""
 
     positions_w: NDArray[np.float64]  # (n, 3) [m]
     radii_m: NDArray[np.float64]  # (n,)
@@ -50,9 +50,11 @@ class _Columns(NamedTuple):
 
 
 def _on_columns(raised_m: NDArray[np.float64]) -> _Columns:
-    """Return the columns on which grains are seen, and their share of the full size."""
+    """Return the columns on which grains are seen, as on the white squares of a chessboard, and their share of size."""
     share = np.clip(raised_m / _FULL_M, 0.0, 1.0)
     i, j = np.nonzero(share > _LEAST_SHARE)
+    white = (i + j) % 2 == 0
+    i, j = i[white], j[white]
     return _Columns(i, j, share[i, j], i * raised_m.shape[1] + j)
 
 

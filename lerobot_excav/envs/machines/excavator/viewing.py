@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.machines.excavator.features import VIEWS
-from lerobot_excav.envs.machines.excavator.scenery import PLUMB_LINE, SOIL_TEXTURE, TERRAIN_SPACING_M, build_scenery
+from lerobot_excav.envs.machines.excavator.scenery import (
+    CLEAR_WALL,
+    PLUMB_LINE,
+    SOIL_TEXTURE,
+    TERRAIN_SPACING_M,
+    build_scenery,
+)
 from lerobot_excav.envs.machines.excavator.soil_paint import COMMANDED_RGB, SHOWN_RGB, TEXELS, Patch, SoilPaint
 from lerobot_excav.envs.machines.excavator.soil_picture import SoilPicture
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
@@ -76,6 +82,7 @@ class WorksiteView:
         for material in range(theirs.nmat):
             name = theirs.material(material).name
             ours.mat_rgba[ours.material(name).id] = theirs.mat_rgba[material]
+        ours.material(CLEAR_WALL).rgba[:3] = ours.material("box").rgba[:3]
         ground, soil = (ours.material(name).id for name in ("ground", "soil"))
         ours.mat_rgba[ground, :3] += _DUST * (_DUST_SHADE * ours.mat_rgba[soil, :3] - ours.mat_rgba[ground, :3])
         sun, own_sun = theirs.light("sun").id, ours.light("sun").id

@@ -9,8 +9,8 @@ from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.arrays import Array, Indices
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import Law, contact, cross, dot, forget
-from lerobot_excav.envs.soil.parcels.impact import add_impulse
 from lerobot_excav.envs.soil.parcels.ground import Site, press_ground
+from lerobot_excav.envs.soil.parcels.impact import add_impulse
 from lerobot_excav.envs.soil.parcels.pairs import Pairs, find_pairs, is_outdated
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, press_box, press_bucket, turned
 from lerobot_excav.envs.soil.parcels.store import OFF_BUCKET, TOUCHES_NOTHING, State

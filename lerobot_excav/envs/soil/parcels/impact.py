@@ -24,12 +24,12 @@ NOTHING.flags.writeable = False
 
 
 @kernel
-def add_impulse(total: Array, point: Vector, impulse: Vector, sign: float) -> None:
-    """Add an impulse [N s] at a world point, times a sign, to a sum (6,): linear, and angular about the world origin."""
+def add_impulse(total: Array, point: Vector, impulse: Vector, factor: float) -> None:
+    """Add an impulse [N s] at a world point, times a factor, to a sum (6,): linear, angular about the world origin."""
     angular = cross(point, impulse)
     for a in range(3):
-        total[a] += sign * impulse[a]
-        total[3 + a] += sign * angular[a]
+        total[a] += factor * impulse[a]
+        total[3 + a] += factor * angular[a]
 
 
 @kernel

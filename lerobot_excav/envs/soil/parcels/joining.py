@@ -48,9 +48,10 @@ def join(
     """Find a place for new parcels, one after the other.
 
     Args:
-        positions: (n, 3) centres [m] of the parcels there are and of the new ones after them; changed in place, like
-            `velocities` (n, 3) [m/s] and `masses` (n,) [kg], where a new one joins: mass, momentum and centre of mass
-            are kept.
+        positions: (n, 3) centres [m] of the parcels there are and of the new ones after them. Where a new one joins,
+            these three change in place, and mass, momentum and centre of mass are kept.
+        velocities: (n, 3) the same [m/s].
+        masses: (n,) the same [kg].
         asleep: (old,) of the parcels there are; a sleeping one is left alone.
         free: How many of the new ones may stay parcels.
         most_kg: Largest mass to which parcels may grow.

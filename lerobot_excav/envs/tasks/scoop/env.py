@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.control import checked_action
+from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.machines.excavator.viewing import WorksiteView
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
@@ -87,6 +88,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         return cast(ExcavatorSettings, self.settings)
 
     def _make_world(self) -> Worksite:
+        rehearse()
         settings = self._excavator_settings
         return Worksite(soil=settings.soil, fidelity=settings.fidelity)
 

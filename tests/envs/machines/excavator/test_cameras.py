@@ -3,7 +3,7 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator import constants as const
 from lerobot_excav.envs.machines.excavator.cameras import CAB, MAIN, OVERVIEW
-from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 
 HEIGHT, WIDTH = 96, 128
 
@@ -39,7 +39,8 @@ def test_camera_axes_are_a_right_handed_frame_that_keeps_up_up(pose):
         pytest.param(MAIN, rectangle(1.0, 1.5, height=1.2), id="main: its top"),
         pytest.param(MAIN, rectangle(0.5, 0.5, TARGET_BOX.center_w), id="main: into the box"),
         pytest.param(MAIN, on_machine((0.4, 0.6, 2.3), (-1.3, -0.9, 0.3), (1.8, 0, 0)), id="main: cab and tracks"),
-        pytest.param(OVERVIEW, rectangle(*0.5 * np.array(DIG_AREA_EXTENT_M)), id="overview: dig area"),
+        pytest.param(OVERVIEW, rectangle(2.1, 2.1), id="overview: where a pile can be"),
+        pytest.param(OVERVIEW, rectangle(1.0, 1.5, height=1.2), id="overview: its top"),
         pytest.param(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w), id="overview: box"),
         pytest.param(OVERVIEW, rectangle(*TARGET_BOX.half_extent_m, TARGET_BOX.center_w, 1.0), id="overview: wall"),
         pytest.param(OVERVIEW, on_machine((-1.5, -1.0, 0.5), (0.5, 2.5, 4.3)), id="overview: raised boom"),
@@ -71,3 +72,7 @@ def test_dig_region_is_large_enough_in_the_default_picture(x, y):
 def test_main_looks_down_more_steeply_than_a_pile_of_sand_is(x, y):
     to_camera = np.subtract(MAIN.position, (x, y, 0.3))
     assert np.degrees(np.arctan2(to_camera[2], np.hypot(*to_camera[:2]))) > 40.0
+
+
+def test_overview_reaches_the_horizon():
+    assert np.degrees(np.arcsin(OVERVIEW.axes[2, 2])) < 0.5 * OVERVIEW.fovy_deg - 2.0

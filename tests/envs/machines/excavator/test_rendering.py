@@ -94,6 +94,25 @@ def test_main_stands_still_and_cab_turns_with_the_machine(machine, renderer):
     assert main < 0.5 < cab
 
 
+# From a scripted operator's cycle: reaching, cutting, curling, lifting, carrying, dumping [rad].
+CYCLE = [
+    (0.37, 0.68, -1.2, -1.02),
+    (0.03, 0.46, -1.52, -0.51),
+    (0.03, 0.37, -1.84, -1.49),
+    (0.03, 0.59, -1.95, -1.66),
+    (0.8, 0.77, -1.64, -2.13),
+    (1.4, 0.78, -1.35, -1.28),
+]
+
+
+@pytest.mark.parametrize("pose", CYCLE)
+def test_the_boom_covers_little_of_the_cab_view(machine, renderer, pose):
+    machine.reset(np.array(pose))
+    bodies = machine.model.geom_bodyid[renderer._pictures.geoms("cab", renderer._all)]
+    arm = np.isin(bodies, [machine.model.body(name).id for name in ("boom", "arm")])
+    assert arm.mean() < 0.13
+
+
 @pytest.mark.parametrize("plane", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.08, -0.05, 0.5)])
 def test_terrain_points_equal_analytic_ray_casts_and_are_soil_only(machine, renderer, soil, plane):
     machine.reset(AWAY)
@@ -165,8 +184,8 @@ def test_loose_soil_is_seen_from_every_camera(machine, renderer, soil_with_parce
     assert pixels_that_differ(with_soil, without) >= 10
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_a_heap_in_the_box_is_seen_from_every_camera(machine, renderer, soil, rng, camera):
+@pytest.mark.parametrize("camera", ["main", "cab", "side"])
+def test_a_heap_in_the_box_is_seen(machine, renderer, soil, rng, camera):
     machine.reset(DUMPING)
     empty = renderer.render(camera)
     positions = TARGET_BOX.center_w + rng.uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 1.2], (500, 3))

@@ -55,6 +55,6 @@ def test_those_in_a_turned_box_lie_in_their_columns():
 
 def test_a_column_keeps_its_shape_when_others_come_and_go(soil):
     one = settled_grains(soil, raised(soil, 0.1), TARGET_BOX)
-    two = settled_grains(soil, np.minimum(raised(soil, 0.1), raised(soil, 0.1, i=3)), TARGET_BOX)
+    two = settled_grains(soil, np.minimum(raised(soil, 0.1), raised(soil, 0.1, i=4)), TARGET_BOX)
     assert one.columns[0] in two.columns
     assert len(two.columns) == 2
