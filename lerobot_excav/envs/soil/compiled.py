@@ -72,18 +72,12 @@ def kernel[F: Callable[..., Any]](function: F) -> F:
     chosen = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = chosen or str(_CACHE)
     try:
-<<<<<<< HEAD
-        return cast(
-            F, numba.njit(cache=True, fastmath=False, parallel=False, nogil=True, error_model="numpy")(function)
-        )
-=======
         return cast(F, numba.njit(cache=True, **_OPTIONS)(function))
     except RuntimeError as error:
         if "no locator" not in str(error):
             raise
         _say_that_nothing_is_kept(numba.config.CACHE_DIR)
         return cast(F, numba.njit(**_OPTIONS)(function))
->>>>>>> main
     finally:
         numba.config.CACHE_DIR = chosen
 
