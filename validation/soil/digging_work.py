@@ -1,6 +1,7 @@
 """Which law of soil mechanics carries the operator's digging work."""
 
 from collections import defaultdict
+from typing import cast
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from lerobot_excav.envs.machines.excavator.digging import JointResistance
 from lerobot_excav.envs.machines.simulator import mujoco
 from lerobot_excav.envs.soil.patches import PatchKind
 from lerobot_excav.envs.soil.tool import Reaction
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from validation import Array
 from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
@@ -67,7 +69,7 @@ def work_of_a_cycle_j(settings: DemonstrationSettings, pair: Pair) -> tuple[dict
     """Let the operator play one cycle; return the work that each kind of patch took [J], and whether it succeeded."""
     env = make_environment(settings.env, with_images=False)
     try:
-        machine = env.unwrapped.worksite.machine
+        machine = cast(ExcavatorEnv, env.unwrapped).worksite.machine
         metered = MeteredResistance(machine.model)
         machine._resistance = metered  # noqa: SLF001 - nothing else tells patches apart
         operator = settings.task_spec.make_operator(np.random.default_rng(settings.episode_seed(pair)))

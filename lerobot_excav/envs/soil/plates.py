@@ -34,11 +34,11 @@ class OuterFaces:
     def of(cls, geometry: ToolGeometry, rows: int) -> "OuterFaces":
         """Cut the profile into pieces, from the edge to the lip, in so many lateral rows."""
         width = geometry.inner_width_m / rows
-        lateral = (np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m
+        lateral: Array = (np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m
         pieces = [_edge_piece(geometry.profile_t)]
         for start, end in zip(geometry.profile_t[:-1], geometry.profile_t[1:], strict=True):
             pieces += _shell_pieces(start, end)
-        starts, ends, normals = (np.array(column) for column in zip(*pieces, strict=True))
+        starts, ends, normals = (np.array(column, dtype=np.float64) for column in zip(*pieces, strict=True))
         is_edge = np.arange(len(pieces)) == 0
         return cls(
             starts_t=_across(starts, lateral),

@@ -37,7 +37,7 @@ SINKAGE_EXPONENT = 1.1
 FALL_REACH_M = 0.5
 """Distance over which the fall of the ground is read (guess: about the breadth of the bucket's bottom)."""
 
-_SIDE_ROWS, _SIDE_COLUMNS = 4, 3
+_SIDE_ROWS, _SIDE_COLUMNS = 3, 2
 """Patches over the buried height and the length of a side plate."""
 
 _NO_SLOPE = 0.05
