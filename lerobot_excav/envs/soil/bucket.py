@@ -128,10 +128,11 @@ class Bucket:
         self, geometry: ToolGeometry, path: Iterator[tuple[Pose, Pose]], field: HeightField, intake: Intake, room: float
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
+        columns = field.heights, field.layer.firm, self._parameters.swell
         for start, end in path:
             motion = geometry.planes_t, start, end, field.window(end.place(geometry.corners_t))
             intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
-            more, over = cut(field.heights, field.active, field.grid, *motion, *intaking)
+            more, over = cut(*columns, field.active, field.grid, *motion, *intaking)
             entered += more
             lost += over
         return entered, lost

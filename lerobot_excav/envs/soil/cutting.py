@@ -82,7 +82,7 @@ def is_covered(surface: float, grid: Grid, planes: Array, pose: Pose, i: int, j:
 def push_aside(
     heights: Array, active: Flags, grid: Grid, planes: Array, pose: Pose, start: Level, direction: Level, volume: float
 ) -> float:
-    """Put a volume on the first column along a level direction that has room for it beside or below the bucket.
+    """Put a loose volume on the first column along a level direction that has room for it beside or below the bucket.
 
     Returns the volume if that column lies beyond the border, else 0.
     """
@@ -133,6 +133,8 @@ def push_direction(planes: Array, rotation: Array, face: int, before: Vector, no
 @kernel
 def cut_column(
     heights: Array,
+    firm: Array,
+    swell: float,
     active: Flags,
     grid: Grid,
     planes: Array,
@@ -150,7 +152,9 @@ def cut_column(
     low, high = max(low, 0.0), min(high, heights[i, j])
     if high <= low:
         return 0.0, 0.0
-    share = (high - low) / samples * grid.dx * grid.dy
+    from_firm = max(0.0, min(high, firm[i, j]) - low)
+    share = (from_firm + (high - low - from_firm) / swell) / samples * grid.dx * grid.dy  # as in the ground
+    firm[i, j] -= from_firm
     # the column sinks first, so that no pushed soil comes to rest on what is being taken away
     heights[i, j] = max(0.0, heights[i, j] - (high - low))
     mark_around(active, i, j)
@@ -168,13 +172,16 @@ def cut_column(
             entered += taken
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
-            lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, share - taken)
+            volume = swell * (share - taken)
+            lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, volume) / swell
     return entered, lost
 
 
 @kernel
 def cut(
     heights: Array,
+    firm: Array,
+    swell: float,
     active: Flags,
     grid: Grid,
     planes: Array,
@@ -188,14 +195,15 @@ def cut(
     """Move the bucket through the soil by one sub-step; heights [m], avalanche marks and `intake` change in place.
 
     The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
-    can still take a volume `room` [m3]. Returns the volumes [m3] that entered and that were pushed over the border.
+    can still take a volume `room` [m3]. Returns the volumes [m3] that entered and that were pushed over the border. All
+    are volumes in the ground; the soil above `firm` [m] is loose and has swelled.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
+                    heights, firm, swell, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
                 )
                 entered += more
                 lost += over

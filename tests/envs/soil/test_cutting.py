@@ -30,7 +30,8 @@ def pose(edge, turned):
 def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     window = field.window(now.place(BUCKET.corners_t))
-    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, intake.bins)
+    columns = field.heights, field.layer.firm, 1.0, field.active, field.grid
+    return cut(*columns, PLANES, before, now, window, bins, room, intake.bins)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))
