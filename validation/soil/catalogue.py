@@ -6,8 +6,9 @@ from lerobot_excav.errors import require_choice
 from validation.soil.experiment import SoilExperiment
 
 _FILES = (
-    *("column_collapse", "heap", "blade_force", "earthmoving_factors", "operator_cycle", "free_fall"),
-    *("ledger", "determinism", "speed", "stall", "force_ramp", "moving_blade", "bucket_drags", "digging_work"),
+    *("column_collapse", "wall_collapse", "ridge", "standing_cut", "heap", "blade_force", "earthmoving_factors"),
+    *("moving_blade", "bucket_drags", "digging_work", "operator_cycle", "free_fall", "ledger", "determinism"),
+    *("stall", "force_ramp", "speed"),
 )
 EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 

@@ -16,7 +16,8 @@ from validation.soil.results import Check, Plot, Result, Series, Table
 MASS_KG = 485.0
 """A bucket of sand."""
 
-AZIMUTHS_RAD = np.arange(8) * math.pi / 4.0
+AZIMUTHS_RAD = np.radians(15.0 + 45.0 * np.arange(8))
+"""None of them is one of the grid's own directions."""
 RADII = (0.25, 0.75)
 """Part of the flank that is measured, as shares of the radius of the ideal cone."""
 
@@ -133,7 +134,7 @@ def run(conditions: Conditions) -> Result:
         ]
         if dt_s == TICK_S:
             profiles.append(heaps[0])
-    header = ("soil", "seed", "repose [°]", *(f"{45 * k}°" for k in range(8)), "height [m]", "ideal cone [m]")
+    header = ("soil", "seed", "repose [°]", *(f"{math.degrees(a):.0f}°" for a in AZIMUTHS_RAD), "height [m]", "ideal cone [m]")
     return Result(
         checks=tuple(checks),
         tables=(Table(header, tuple(rows)),),

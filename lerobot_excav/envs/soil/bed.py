@@ -4,7 +4,8 @@ Static soil is never steeper than the repose slope s: |grad b| <= s. Where a col
 neighbours, its upper part becomes mobile, down to the height that they support: the eikonal equation |grad b| = s,
 solved upwind on the eight triangles between a column, a neighbour along an axis and one on the diagonal. A planar slope
 is exact on them whatever its azimuth. Sweeps over the columns in alternating orders (fast sweeping, Zhao 2005; recalled)
-carry the failure across any number of columns, so that its speed does not depend on the size of a cell.
+carry the failure across any number of columns, so that its speed does not depend on the size of a cell. Firm soil with
+cohesion holds; it fails in another way (`standing`).
 """
 
 import math
@@ -73,6 +74,8 @@ def lower_bed(layer: Layer, ground: Ground, window: Window) -> None:
                     continue  # the bed below a layer that flows is supported as before
                 active[i, j] = SEEN
                 supported = supported_height(layer.support, ground, i, j, bed[i, j])
+                if ground.cohesion_m > 0.0:
+                    supported = max(supported, layer.firm[i, j])
                 if supported < bed[i, j] - excess:
                     mark_around(active, i, j)
                     active[i, j] = SEEN

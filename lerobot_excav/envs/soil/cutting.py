@@ -93,7 +93,7 @@ def is_covered(surface: float, grid: Grid, planes: Array, pose: Pose, i: int, j:
 def push_aside(
     heights: Array, active: Flags, grid: Grid, planes: Array, pose: Pose, start: Level, direction: Level, volume: float
 ) -> float:
-    """Put a volume on the first column along a level direction that has room for it beside or below the bucket.
+    """Put a loose volume on the first column along a level direction that has room for it beside or below the bucket.
 
     Returns the volume if that column lies beyond the border, else 0.
     """
@@ -148,8 +148,25 @@ def _taken(volume: float, room: float, fade: float) -> float:
 
 
 @kernel
+def _take_above(
+    heights: Array, firm: Array, swell: float, i: int, j: int, low: float, area: float, room: float, fade: float
+) -> float:
+    """Lower a column towards `low` [m] as far as there is room; return the volume taken [m3], as in the ground."""
+    above = max(0.0, heights[i, j] - low)
+    from_firm = min(above, max(0.0, firm[i, j] - low))
+    volume = (from_firm + (above - from_firm) / swell) * area
+    taken = _taken(volume, room, fade)
+    if taken > 0.0:
+        heights[i, j] = max(low, heights[i, j] - above * taken / volume)
+        firm[i, j] -= from_firm * taken / volume
+    return taken
+
+
+@kernel
 def cut_column(
     heights: Array,
+    firm: Array,
+    swell: float,
     active: Flags,
     grid: Grid,
     planes: Array,
@@ -169,7 +186,9 @@ def cut_column(
     if high <= low:
         return 0.0, 0.0
     area, entered, lost = grid.dx * grid.dy, 0.0, 0.0
-    share = (high - low) / samples * area
+    from_firm = max(0.0, min(high, firm[i, j]) - low)
+    share = (from_firm + (high - low - from_firm) / swell) / samples * area  # as in the ground
+    firm[i, j] -= from_firm
     # the column sinks first, so that no pushed soil comes to rest on what is being taken away
     heights[i, j] = max(0.0, heights[i, j] - (high - low))
     mark_around(active, i, j)
@@ -186,13 +205,13 @@ def cut_column(
             entered += taken
         if taken < share:
             direction = push_direction(planes, pose_now.rotation, face, before, now)
-            lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, share - taken)
+            volume = swell * (share - taken)
+            lost += push_aside(heights, active, grid, planes, pose_now, (x, y), direction, volume) / swell
     if top == OPENING:
         # What was above the opening has sunk to where it is open below. It must not wait for the next sub-step: the
         # plate may have risen above it by then.
-        taken = _taken(max(0.0, heights[i, j] - low) * area, room - entered, fade)
+        taken = _take_above(heights, firm, swell, i, j, low, area, room - entered, fade)
         if taken > 0.0:
-            heights[i, j] = max(low, heights[i, j] - taken / area)
             now = to_tool(pose_now.position, pose_now.rotation, x, y, low)
             gather(intake, now[0], now[1], now[2], taken)
             entered += taken
@@ -202,6 +221,8 @@ def cut_column(
 @kernel
 def cut(
     heights: Array,
+    firm: Array,
+    swell: float,
     active: Flags,
     grid: Grid,
     planes: Array,
@@ -217,14 +238,28 @@ def cut(
 
     The window holds the bucket at the end, and each of its columns is looked at in so many vertical samples. The bucket
     can still take a volume `room` [m3], and over the last `fade` [m3] of it ever less of what meets the opening.
-    Returns the volumes [m3] that entered and that were pushed over the border.
+    Returns the volumes [m3] that entered and that were pushed over the border. All are volumes in the ground; the soil
+    above `firm` [m] is loose and has swelled.
     """
     entered, lost = 0.0, 0.0
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, fade, intake
+                    heights,
+                    firm,
+                    swell,
+                    active,
+                    grid,
+                    planes,
+                    pose_before,
+                    pose_now,
+                    i,
+                    j,
+                    samples,
+                    room - entered,
+                    fade,
+                    intake,
                 )
                 entered += more
                 lost += over

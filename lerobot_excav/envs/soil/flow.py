@@ -14,8 +14,9 @@ import math
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.bed import lower_bed
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.layer import FLOWING, Ground, Layer, Window, active_window, wider
+from lerobot_excav.envs.soil.layer import FLOWING, Ground, Layer, Window, active_window, mark_around, wider
 from lerobot_excav.envs.soil.momentum import THINNEST_M, accelerate
+from lerobot_excav.envs.soil.standing import fail_cuts
 
 COURANT = 0.6
 """Way of the fastest wave per sub-step, in cells (tuned: symmetric collapses stay so)."""
@@ -31,16 +32,23 @@ def _note_beds(layer: Layer, window: Window) -> None:
         for j in range(window.j0, window.j1):
             if layer.heights[i, j] - layer.bed[i, j] <= THINNEST_M:
                 layer.bed[i, j] = layer.heights[i, j]
+            layer.firm[i, j] = min(layer.firm[i, j], layer.heights[i, j])
             layer.bed_before[i, j] = layer.bed[i, j]
             layer.support[i, j] = layer.bed[i, j] if layer.heights[i, j] < layer.ceiling[i, j] else math.inf
 
 
 @kernel
-def _join(layer: Layer, window: Window) -> float:
-    """Slow the layer down by the soil at rest that has just joined it; return the speed [m/s] of the fastest wave."""
+def _join(layer: Layer, ground: Ground, window: Window) -> float:
+    """Let the soil that has just come loose swell, and slow the layer down by it; return the speed of the fastest wave.
+
+    Speeds are in m/s.
+    """
     fastest = 0.0
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
+            if layer.bed[i, j] < layer.firm[i, j]:
+                layer.heights[i, j] += (ground.swell - 1.0) * (layer.firm[i, j] - layer.bed[i, j])
+                layer.firm[i, j] = layer.bed[i, j]
             depth = layer.heights[i, j] - layer.bed[i, j]
             if depth <= THINNEST_M:
                 continue
@@ -89,6 +97,8 @@ def _discharge(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
                         flux = min(flux, 0.25 * room / dt * (ground.dx if axis == 0 else ground.dy))
                     speed = math.copysign(flux / depth, speed)  # what is held back does not gather speed
                     layer.next_speeds[axis, i, j] = 0.0
+                elif layer.speeds[axis, i, j] != 0.0 and i < nx and j < ny:
+                    mark_around(layer.active, i, j)  # it has just stopped, perhaps on a slope that it came up
                 layer.speeds[axis, i, j] = speed
                 layer.flux[axis, i, j] = math.copysign(flux, speed)
 
@@ -125,6 +135,8 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
     """
     nx, ny = layer.heights.shape
     window, over_border, left = Window(0, nx, 0, ny), 0.0, dt
+    if ground.cohesion_m > 0.0:
+        fail_cuts(layer, ground, active_window(layer.active, window))
     while left > 1e-9 * dt:
         failing = active_window(layer.active, window)
         if failing.i1 == 0:
@@ -132,7 +144,7 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
         window = wider(layer.active, failing)  # what comes loose in this sub-step moves into a column more
         _note_beds(layer, window)
         lower_bed(layer, ground, failing)
-        fastest = _join(layer, window)
+        fastest = _join(layer, ground, window)
         step = left / max(1, math.ceil(fastest * left / (COURANT * min(ground.dx, ground.dy))))
         accelerate(layer, ground, window, step)
         _share_out(layer, ground, window, step)

@@ -9,6 +9,7 @@ from lerobot_excav.envs.soil.arrays import Array, Bools, Flags
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.flow import flow
 from lerobot_excav.envs.soil.layer import Ground, Layer, Window, mark_around
+from lerobot_excav.envs.soil.parameters import Strength
 from lerobot_excav.errors import require
 
 
@@ -143,6 +144,7 @@ class HeightField:
         require(above, f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.")
         self.heights[:] = new
         self.layer.bed[:] = new
+        self.layer.firm[:] = new
         self.layer.speeds[:] = 0.0
         self.layer.flux[:] = 0.0
         self.active[:] = 1
@@ -182,11 +184,16 @@ class HeightField:
         j0, j1 = int(np.ceil((low[1] - y0) / dy)), int(np.floor((high[1] - y0) / dy)) + 1
         return Window(min(max(i0, 0), nx), min(max(i1, 0), nx), min(max(j0, 0), ny), min(max(j1, 0), ny))
 
-    def flow(self, dt_s: float, slope_tan: float) -> float:
-        """Let soil avalanche for some time; return the volume [m3] that ran off over the border."""
+    def solid_m3(self, swell: float) -> float:
+        """Return the volume [m3] of all columns as it was in the ground, before any of it was loosened."""
+        firm = float(self.layer.firm.sum())
+        return (firm + (float(self.heights.sum()) - firm) / swell) * self.cell_area_m2
+
+    def flow(self, dt_s: float, strength: Strength) -> float:
+        """Let soil avalanche for some time; return the volume [m3], as in the ground, that ran off over the border."""
         if self._at_rest:
             return 0.0
-        ground = Ground(slope_tan, self.grid.dx, self.grid.dy, self._border_height_m)
+        ground = Ground(*strength, self.grid.dx, self.grid.dy, self._border_height_m)
         lost, moves = flow(self.layer, ground, dt_s)
         self._at_rest = not moves
-        return lost * self.cell_area_m2
+        return lost / strength.swell * self.cell_area_m2

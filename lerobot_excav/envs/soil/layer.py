@@ -33,6 +33,7 @@ class Layer(NamedTuple):
 
     heights: Array  # (nx, ny) of the surface above the floor [m]
     bed: Array  # (nx, ny) of the static soil [m]; what lies above it is mobile
+    firm: Array  # (nx, ny) of the soil that was never loosened [m]; what lies above it has swelled and has no cohesion
     active: Flags  # (nx, ny) columns that the next sub-step looks at: 0 or one of `CHANGED`, `FLOWING`, `SEEN`
     ceiling: Array  # (nx, ny) height up to which soil can flow [m]: the underside of the bucket, else infinite
     speeds: Array  # (2, nx + 1, ny + 1) of the mobile layer across the faces [m/s]
@@ -49,6 +50,7 @@ class Layer(NamedTuple):
         return cls(
             heights=np.zeros(shape),
             bed=np.zeros(shape),
+            firm=np.zeros(shape),
             active=np.zeros(shape, dtype=np.uint8),
             ceiling=np.full(shape, np.inf),
             speeds=np.zeros(faces),
@@ -68,7 +70,9 @@ the two, and its bed has been looked at since."""
 class Ground(NamedTuple):
     """What flows, and on what grid."""
 
-    slope_tan: float  # tangent of the repose angle
+    slope_tan: float  # as in `parameters.Strength`
+    cohesion_m: float  # as there [m]
+    swell: float  # as there
     dx: float  # cell size along x [m]
     dy: float  # the same along y [m]
     border_height: float  # of the level ground around the field [m]; infinite closes the border

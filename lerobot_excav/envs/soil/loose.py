@@ -76,6 +76,7 @@ class LooseSoil:
         self._box = _box_walls(container, floor_depth_m)
         self._level_z = floor_depth_m
         self._density_kg_m3 = parameters.density_kg_m3
+        self._swell = parameters.swell
         laws = _laws(parameters, fidelity, self.whole_kg)
         self.population = Population(WALLS + 3, laws, fidelity.parcel_radius_m, self.whole_kg, fidelity.most_awake)
         self.clear()
@@ -155,7 +156,7 @@ class LooseSoil:
         """Put landed parcels on the fields; return the mass [kg] that belongs to neither."""
         if len(landed.masses_kg) == 0:
             return 0.0
-        volumes = landed.masses_kg / self._density_kg_m3
+        volumes = landed.masses_kg / self._density_kg_m3 * self._swell
         on_ground, in_box = landed.is_on_ground, landed.is_in_box
         if on_ground.any():
             self._field.deposit(landed.points_w[on_ground], volumes[on_ground])

@@ -9,7 +9,7 @@ flux through the faces, upwind, divided by the depth at the face.
 import math
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
-from lerobot_excav.envs.soil.arrays import Array, Level
+from lerobot_excav.envs.soil.arrays import Array, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.layer import Ground, Layer, Window
 
@@ -63,11 +63,11 @@ def _height(heights: Array, i: int, j: int, border_height: float) -> float:
 
 
 @kernel
-def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> Level:
-    """Return the slope of the surface at a face, along its axis and across it.
+def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> Vector:
+    """Return the slope of the surface at a face, along its axis and across it, and the greatest slope there.
 
     Across it is the mean of both sides of the face; on a crest or in a valley, where they differ in sign, the steeper
-    one: their mean would hide the slope.
+    one: their mean would hide the slope. The greatest slope takes the steeper one everywhere.
     """
     di, dj, border = 1 - axis, axis, ground.border_height
     step, side = (ground.dx, ground.dy) if axis == 0 else (ground.dy, ground.dx)
@@ -75,9 +75,9 @@ def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> Level:
     low = _height(heights, i - di - dj, j - dj - di, border) + _height(heights, i - dj, j - di, border)
     high = _height(heights, i - di + dj, j - dj + di, border) + _height(heights, i + dj, j + di, border)
     left, right = (before + after - low) / (2.0 * side), (high - before - after) / (2.0 * side)
-    if left * right > _SAME_SIGN:
-        return (after - before) / step, 0.5 * (left + right)
-    return (after - before) / step, (left if abs(left) > abs(right) else right)
+    down, steeper = (after - before) / step, left if abs(left) > abs(right) else right
+    aside = 0.5 * (left + right) if left * right > _SAME_SIGN else steeper
+    return down, aside, math.sqrt(down * down + steeper * steeper)
 
 
 @kernel
@@ -111,18 +111,19 @@ def _carried(speeds: Array, flux: Array, ground: Ground, axis: int, i: int, j: i
 
 
 @kernel
-def _rubbed(u: float, v: float, was: float, slope: Level, slope_tan: float, depth: float, dt: float) -> float:
+def _rubbed(u: float, v: float, was: float, slope: Vector, slope_tan: float, depth: float, dt: float) -> float:
     """Return the part [m/s] of a driven velocity (u, v) along the axis that friction leaves after a time [s].
 
-    It moved at the speed `was` before. Soil at rest stays so, and slow soil stops, where the slope may rest.
+    It moved at the speed `was` before. Soil at rest stays so where even the greatest slope may rest; slow soil stops
+    where the slope may rest.
     """
     driven = math.sqrt(u * u + v * v)
     left = driven - dt * GRAVITY_M_S2 * friction(slope_tan, was, depth)
     if left < REST_M_S:
+        if was == 0.0:
+            return u * REST_M_S / driven if slope[2] > slope_tan + START_TAN else 0.0
         if left <= 0.0 or math.sqrt(slope[0] ** 2 + slope[1] ** 2) <= slope_tan + START_TAN:
             return 0.0
-        if was == 0.0:
-            left = REST_M_S
     return u * left / driven
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any, NamedTuple
 
+from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.errors import require, shown
 
 
@@ -16,6 +17,14 @@ class Origin(NamedTuple):
     high: float  # greatest allowed value
     kind: str  # `paper`, `datasheet`, `derived`, `tuned` or `guess`
     source: str  # document or reasoning
+
+
+class Strength(NamedTuple):
+    """What keeps soil in place, and how much room it takes once it is loose."""
+
+    slope_tan: float  # tangent of the friction angle, which is the repose angle of loose soil
+    cohesion_m: float  # cohesion of firm soil over its unit weight [m]
+    swell: float  # volume of loosened soil over its volume in the ground
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +56,12 @@ class SoilParameters:
     def slope_tan(self) -> float:
         """Tangent of the repose angle."""
         return math.tan(self.friction_angle_rad)
+
+    @property
+    def strength(self) -> Strength:
+        """Strength of the soil in a height field."""
+        cohesion_m = self.cohesion_pa / (self.density_kg_m3 * GRAVITY_M_S2)
+        return Strength(self.slope_tan, cohesion_m, self.swell)
 
     def parcel_mass_kg(self, radius_m: float) -> float:
         """Return the mass of a parcel: its sphere carries the voids around it, so that a heap has the bulk density."""

@@ -35,7 +35,7 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
     layer.heights[:] = heights
     layer.bed[:] = heights
     layer.active[:] = 1
-    ground = Ground(float(slope_tan), float(cell_size_m), float(cell_size_m), math.inf)
+    ground = Ground(float(slope_tan), 0.0, 1.0, float(cell_size_m), float(cell_size_m), math.inf)
     for _ in range(round(_TIME_LIMIT_S / TICK_S)):
         _, moves = flow(layer, ground, TICK_S)
         if not moves:

@@ -158,7 +158,7 @@ class Soil:
         self._out_of_bounds_kg += self._loose.step(geometry, before, self._bucket.pose, dt_s, cutting=entered > 0.0)
         self._load_kg, com_t = self._weighed_load(tool)
         for field in (self._field, self._box_field):
-            self._out_of_bounds_m3 += field.flow(dt_s, self.parameters.slope_tan)
+            self._out_of_bounds_m3 += field.flow(dt_s, self.parameters.strength)
         return self._reaction(tool, dt_s, com_t)
 
     def _reaction(self, tool: Tool | None, dt_s: float, com_t: Array) -> Reaction:
@@ -274,7 +274,7 @@ class Soil:
     @property
     def box_mass_kg(self) -> float:
         """Mass of the soil at rest in the target box."""
-        return self._box_field.volume_m3 * self.density_kg_m3
+        return self._box_field.solid_m3(self.parameters.swell) * self.density_kg_m3
 
     def mechanical_energy_j(self) -> float:
         """Return the kinetic energy of all parcels and their potential energy above the rigid floor."""
@@ -287,7 +287,7 @@ class Soil:
     def ledger_kg(self) -> dict[str, float]:
         """Return the mass in each place; the sum is constant but for `reset` and `add_parcels`."""
         return {
-            "grid": self._field.volume_m3 * self.density_kg_m3,
+            "grid": self._field.solid_m3(self.parameters.swell) * self.density_kg_m3,
             "parcels": self.airborne_mass_kg,
             "bucket": self.payload_mass_kg,
             "box": self.box_mass_kg,

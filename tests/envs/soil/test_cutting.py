@@ -31,7 +31,8 @@ def move(field, before, now, room=1.0, bins=4, intake=None):
     intake = intake or Intake(BUCKET, PARCEL_RADIUS)
     low, high = now.place(BUCKET.corners_t).min(axis=0), now.place(BUCKET.corners_t).max(axis=0)
     window = field.window(np.stack([low - 0.5 * CELL, high + 0.5 * CELL]))
-    return cut(field.heights, field.active, field.grid, PLANES, before, now, window, bins, room, 1e-9, intake.bins)
+    columns = field.heights, field.layer.firm, 1.0, field.active, field.grid
+    return cut(*columns, PLANES, before, now, window, bins, room, 1e-9, intake.bins)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.5, 0.5), st.floats(-0.2, 0.2))

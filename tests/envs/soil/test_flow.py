@@ -15,6 +15,7 @@ from lerobot_excav.envs.soil.parameters import PRESETS
 from validation.soil.reference import avalanche
 from validation.soil.reference.worlds import flat
 
+SAND = PRESETS["sand"].strength
 SLOPE = PRESETS["sand"].slope_tan
 CELL, WIDE = 0.05, 0.07
 SHAPE = (6, 7)
@@ -33,7 +34,7 @@ def random_layer(seed, border):
     layer.heights[:] = layer.bed + depth
     layer.ceiling[:] = np.where(rng.random(SHAPE) < 0.2, layer.heights + rng.uniform(-0.05, 0.1, SHAPE), math.inf)
     layer.active[:] = 1
-    ground = Ground(SLOPE, CELL, WIDE, border)
+    ground = Ground(*SAND, CELL, WIDE, border)
     for axis in range(2):
         for i, j in np.ndindex(SHAPE[0] + 1 - axis, SHAPE[1] + axis):
             before, after = (i - 1 + axis, j - axis), (i, j)
@@ -76,7 +77,7 @@ def test_a_sub_step_moves_what_the_reference_moves(seed, border):
 def test_the_supported_height_is_that_of_the_reference(seed, border):
     support = np.random.default_rng(seed).uniform(0.0, 0.2, SHAPE)
     support[np.random.default_rng(seed + 1).random(SHAPE) < 0.2] = math.inf
-    ground = Ground(SLOPE, CELL, WIDE, border)
+    ground = Ground(*SAND, CELL, WIDE, border)
     for i, j in np.ndindex(SHAPE):
         expected = avalanche.supported_height(support, ground, i, j, 0.3)
         assert supported_height(support, ground, i, j, 0.3) == pytest.approx(expected, abs=1e-8)
@@ -86,18 +87,18 @@ def test_a_bed_fails_down_to_what_its_neighbours_support_across_the_whole_field(
     layer = Layer.empty((40, 9))
     layer.heights[:20] = layer.bed[:20] = layer.support[:20] = 1.0
     layer.active[:] = 1
-    lower_bed(layer, Ground(SLOPE, CELL, CELL, math.inf), Window(0, 40, 0, 9))
+    lower_bed(layer, Ground(*SAND, CELL, CELL, math.inf), Window(0, 40, 0, 9))
     expected = np.minimum(1.0, np.maximum(0.0, np.arange(20, -20, -1) * CELL * SLOPE))
     expected[20:] = 0.0
     np.testing.assert_allclose(layer.bed, np.tile(expected[:, None], 9), atol=1e-9)
 
 
-def run(heights, cell, seconds, dt=0.02, slope_tan=SLOPE, border=math.inf):
+def run(heights, cell, seconds, dt=0.02, strength=SAND, border=math.inf):
     """Let a field flow; yield its heights and the time after every step."""
     field = HeightField(heights.shape, (cell, cell), border)
     field.reset(heights)
     for k in range(round(seconds / dt)):
-        field.flow(dt, slope_tan)
+        field.flow(dt, strength)
         yield (k + 1) * dt, field.heights
 
 
@@ -180,7 +181,7 @@ def test_soil_above_a_ceiling_stays_and_soil_below_takes_what_fits():
     heights[4, 4], heights[4, 6] = 1.0, 0.5
     field.reset(heights)
     field.ceiling[4, 4:6] = 0.05
-    field.flow(3.0, SLOPE)
+    field.flow(3.0, SAND)
     assert field.heights[4, 4] == 1.0
     assert 0.0 < field.heights[4, 5] <= 0.05
     assert field.heights[4, 6] < 0.5
@@ -189,7 +190,7 @@ def test_soil_above_a_ceiling_stays_and_soil_below_takes_what_fits():
 def test_soil_runs_off_an_open_border_and_is_counted():
     field = flat(0.5, 10)
     before = field.volume_m3
-    lost = sum(field.flow(0.1, SLOPE) for _ in range(20))
+    lost = sum(field.flow(0.1, SAND) for _ in range(20))
     assert 0.0 < lost < before
     assert field.volume_m3 + lost == pytest.approx(before, rel=1e-12)
 
@@ -197,10 +198,10 @@ def test_soil_runs_off_an_open_border_and_is_counted():
 def test_walls_hold_soil_up_to_their_height():
     field = HeightField((10, 10), (CELL, CELL), 0.4)
     field.reset(np.full((10, 10), 0.4))
-    assert field.flow(0.1, SLOPE) == 0.0
+    assert field.flow(0.1, SAND) == 0.0
     field.reset(np.full((10, 10), 0.9))
     for _ in range(100):
-        field.flow(0.1, SLOPE)
+        field.flow(0.1, SAND)
     edge = np.concatenate([field.heights[0], field.heights[-1]])
     assert edge.max() <= 0.4 + 1.02 * SLOPE * CELL
     assert field.heights.min() >= 0.4 - 1e-9

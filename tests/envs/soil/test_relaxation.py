@@ -16,7 +16,7 @@ from validation.soil.reference.avalanche import steepest
 
 SLOPE = PRESETS["sand"].slope_tan
 CELL = 0.05
-HOLDS_DEG = 0.75
+HOLDS_DEG = 1.5
 """How much steeper than the repose angle a single column may stand at rest."""
 
 small_fields = arrays(np.float64, (6, 7), elements=st.floats(0.0, 2.0))

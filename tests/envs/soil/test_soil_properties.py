@@ -22,7 +22,7 @@ EXTENT_M = 3.0
 NEAREST_PLATE = 0.15
 """Smallest distance of a parcel's centre to a plate, as a share of its radius: steel never gets past the centre."""
 
-HOLDS_DEG = 0.75
+HOLDS_DEG = 1.5
 """How much steeper than the repose angle a single column may stand at rest."""
 
 seeds = st.integers(0, 2**32 - 1)
@@ -137,7 +137,8 @@ def test_any_motion_keeps_the_books_and_leaves_no_parcel_in_a_plate(preset, fide
 @few(2)
 def test_no_slope_stays_steeper_than_repose_once_everything_rests(preset, fidelity, seed):
     rng = np.random.default_rng(seed)
-    soil = random_soil(preset, fidelity, rng, 0.0)
+    loose = dataclasses.replace(PRESETS[preset], cohesion_pa=0.0)  # with cohesion, cuts stand
+    soil = random_soil(loose, fidelity, rng, 0.0)
     total = sum(soil.ledger_kg().values())
     for tick, tool in enumerate(motion([*random_goals(rng), DUMPED, DUMPED, DUMPED])):
         soil.step(TICK_S, tool if tick % 40 != 39 else None)  # a bucket that goes and comes takes nothing along

@@ -16,7 +16,7 @@ _WAYS = np.linspace(0.0, 1.0, 4001)
 def steepest(heights: Array, cell_m: float) -> float:
     """Return the tangent of the slope at which every column is supported by its neighbours (`supported_height`)."""
     low, high = 0.0, float(np.ptp(heights)) / cell_m
-    ground = Ground(0.0, cell_m, cell_m, math.inf)
+    ground = Ground(0.0, 0.0, 1.0, cell_m, cell_m, math.inf)
     for i, j in np.ndindex(heights.shape):
         low_here, high_here = low, high
         own = float(heights[i, j])
@@ -66,7 +66,7 @@ def _depth(layer: Layer, column: tuple[int, int] | None) -> float:
     return 0.0 if column is None else float(layer.heights[column] - layer.bed[column])
 
 
-def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> tuple[float, float]:
+def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> tuple[float, float, float]:
     if math.isinf(ground.border_height):
         padded = np.pad(heights, 1, mode="edge")
     else:
@@ -78,7 +78,8 @@ def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> tuple[f
     mean = 0.5 * (before + after)
     left, right = (mean[j + 1] - mean[j]) / steps[1], (mean[j + 2] - mean[j + 1]) / steps[1]
     aside = 0.5 * (left + right) if left * right > 1e-9 else max(left, right, key=abs)
-    return float((after[j + 1] - before[j + 1]) / steps[0]), float(aside)
+    down = float((after[j + 1] - before[j + 1]) / steps[0])
+    return down, float(aside), math.hypot(down, max(left, right, key=abs))
 
 
 def _face(layer: Layer, ground: Ground, axis: int, i: int, j: int, dt: float) -> float:
@@ -94,14 +95,16 @@ def _face(layer: Layer, ground: Ground, axis: int, i: int, j: int, dt: float) ->
         return 0.0
     u, v = _carried(layer, ground, axis, i, j, sum(depths) / 2.0, dt)
     was = math.hypot(u, v)
-    down, aside = _slope(layer.heights, ground, axis, i, j)
+    down, aside, greatest = _slope(layer.heights, ground, axis, i, j)
     u, v = u - dt * GRAVITY_M_S2 * down, v - dt * GRAVITY_M_S2 * aside
     left = math.hypot(u, v) - dt * GRAVITY_M_S2 * friction(ground.slope_tan, was, max(depths))
-    may_rest = math.hypot(down, aside) <= ground.slope_tan + START_TAN
-    if left <= 0.0 or (left < REST_M_S and may_rest):
-        return 0.0
     if was == 0.0:
-        left = max(left, REST_M_S)
+        starts = greatest > ground.slope_tan + START_TAN
+        left = max(left, REST_M_S) if starts or left >= REST_M_S else 0.0
+    elif left < REST_M_S and math.hypot(down, aside) <= ground.slope_tan + START_TAN:
+        left = 0.0
+    if left <= 0.0:
+        return 0.0
     speed = u * left / math.hypot(u, v)
     return speed if depths[0 if speed > 0.0 else 1] > THINNEST_M else 0.0
 
