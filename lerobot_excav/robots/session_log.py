@@ -11,9 +11,9 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
     {"event": "command", "target_id": 1}
     {"event": "held"}
     {"event": "restart", "scene_id": 0, "target_id": 3, "state": [...], "action": [...]}
-    {"event": "ended"}
+    {"event": "ended", "frames": 150}
     {"event": "discarded"}
-    {"event": "stopped"}
+    {"event": "stopped", "frames": 12}
 
 - `session`: a robot that connected has begun to record; what the simulation is set to, and the task text of the
   command, null if nobody knows it.
@@ -26,7 +26,8 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
 - `restart`: the scene was restarted or changed instead of carrying the frame's action out. State and action are null
   where LeRobot had no frame to record.
 - `ended`: the time for resetting the scene has begun; `discarded`: the episode was thrown away; `stopped`: the
-  recording is over, by an interruption perhaps, and only the dataset tells whether it has kept the episode.
+  recording is over, by an interruption perhaps, and only the dataset tells whether it has kept the episode. `frames`
+  is how many frames were noted, so that a lost line is noticed.
 """
 
 from collections.abc import Sequence
@@ -67,6 +68,7 @@ class SessionLog:
         self._is_begun = False  # whether this session's first line is written
         self._is_running = False  # whether an episode is
         self._target_id: int | None = None
+        self._frames = 0  # of the running episode
 
     def start(self) -> None:
         """Open the file to append to it; it is made if it is missing."""
@@ -95,7 +97,7 @@ class SessionLog:
             self._keep_others_away()
             self._write(self._session)
         self._is_begun = self._is_running = True
-        self._target_id = target_id
+        self._target_id, self._frames = target_id, 0
         start = {"episode_index": episode_index, "scene_id": scene_id, "target_id": target_id}
         self._write({"event": "episode", **start})
 
@@ -107,6 +109,7 @@ class SessionLog:
         if target_id not in (None, self._target_id):
             self._target_id = target_id
             events.append({"event": "command", "target_id": target_id})
+        self._frames += 1
         self._write(*events)
 
     def note_held(self) -> None:
@@ -120,6 +123,7 @@ class SessionLog:
         """Note that a scene was started within the episode, and the frame in which that was asked for."""
         if self._is_running:
             self._target_id = target_id
+            self._frames += state is not None and action is not None
             start = {"scene_id": scene_id, "target_id": target_id}
             self._write({"event": "restart", **start, "state": state, "action": action})
 
@@ -150,7 +154,7 @@ class SessionLog:
 
     def _finish(self, event: str) -> None:
         if self._is_running:
-            self._write({"event": event}, is_last=True)
+            self._write({"event": event, "frames": self._frames}, is_last=True)
         self._is_running = False
 
     def _write(self, *events: dict[str, Any], is_last: bool = False) -> None:

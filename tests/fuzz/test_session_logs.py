@@ -29,6 +29,7 @@ WRONG_FIELDS = {
         "state": [None, [], [0.0], "x", [float("nan")] * 4],
         "action": [None, [], [0.0], "x", [float("inf"), 0.0]],
     },
+    "ended": {"frames": [-1, 0, None, 1.5, 99]},
 }
 
 

@@ -86,7 +86,7 @@ def test_a_finished_episode_is_on_the_disk_before_the_next_begins(log, monkeypat
     monkeypatch.setattr("os.fsync", lambda _: synced.append(log.path.read_text().splitlines()[-1]))
     record(log, 0)
     log.end()
-    assert synced == ['{"event": "ended"}']
+    assert synced == ['{"event": "ended", "frames": 1}']
 
 
 def test_an_arm_whose_episodes_others_end_may_change_its_command_late():

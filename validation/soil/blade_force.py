@@ -1,4 +1,4 @@
-"""T5: force on a plane blade that cuts dry sand."""
+"""T5: the force kernel on a plane blade, against formulas for cutting dry sand (measured ones: `moving_blade`)."""
 
 import dataclasses
 import math
@@ -48,9 +48,10 @@ def total_force_n(rake_deg: float, depth_m: float) -> float:
 
 @experiment(
     code="T5",
-    title="Force on a blade",
+    title="Formulas for a blade",
     source="Hatamura and Chijiiwa 1977, as in Miedema, The Delft Sand, Clay and Rock Cutting Model, ch. 11 (their "
-    "measured forces are in figures; the gate is the bracket of three theories for their sand and blade)",
+    "measured forces are in figures; the gate is the bracket of three theories for their sand and blade: it is a "
+    "formula, and no validation)",
     measures="A blade 0.33 m wide at a rake of 30° to 90°, 0.05 m to 0.15 m deep, in level sand of 38°, 26.6° on steel "
     "and 1460 kg/m³.",
     gate="in every cell from 0.8 times the least to 1.25 times the greatest theory; growing with depth, exponent "

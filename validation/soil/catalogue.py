@@ -7,7 +7,7 @@ from validation.soil.experiment import SoilExperiment
 
 _FILES = (
     *("column_collapse", "heap", "blade_force", "earthmoving_factors", "operator_cycle", "free_fall"),
-    *("ledger", "determinism", "speed", "stall", "force_ramp"),
+    *("ledger", "determinism", "speed", "stall", "force_ramp", "moving_blade", "bucket_drags", "digging_work"),
 )
 EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 

@@ -69,8 +69,9 @@ def dig(parameters: SoilParameters, *, fidelity: str) -> Dig:
     for number, (_, command, count) in enumerate(PHASES):
         for _ in range(count):
             ahead, before = _arm_direction(machine), machine.cutting_edge_pos_w
-            # Without its load, the soil's resistance is the only force from outside.
+            # Without its load, which has weight and gives its momentum, the resistance is the only force from outside.
             reaction = dataclasses.replace(soil.step(TICK_S, machine.tool()), payload_mass_kg=0.0)
+            reaction = reaction.with_impulse(np.zeros(6))
             machine.tick(np.array(command), reaction)
             power = machine.data.qfrc_applied @ machine.data.qvel  # of the soil alone
             edge = machine.cutting_edge_pos_w

@@ -7,6 +7,7 @@ from pathlib import Path
 from lerobot_excav.datasets.complete.session_events import (
     ActionEvent,
     CommandEvent,
+    DiscardEvent,
     EndEvent,
     EpisodeEvent,
     Event,
@@ -142,11 +143,11 @@ class _Reader:
                 self._session, self._last = event, None
             case EpisodeEvent():
                 self._begin(event, place)
-            case EndEvent(event="discarded"):
+            case DiscardEvent():
                 self.episodes.pop(self._episode(event).episode_index, None)
                 self._last = None
             case EndEvent():
-                self._running(event).end = event.event
+                self._end(event, self._running(event))
             case _:
                 self._note(event, self._running(event))
 
@@ -158,6 +159,16 @@ class _Reader:
         self._last = SessionEpisode(episode_index=index, place=place, session=self._session, runs=[start])
         self._require_target(event.target_id, self._last)
         self.episodes = {i: episode for i, episode in self.episodes.items() if i < index} | {index: self._last}
+
+    @staticmethod
+    def _end(event: EndEvent, episode: SessionEpisode) -> None:
+        noted = sum(len(run.frames) for run in episode.runs)
+        require(
+            event.frames == noted,
+            f"frames={event.frames}, but the log has {noted} frames of episode {episode.episode_index}; lines were "
+            "lost or added, so it cannot be repeated",
+        )
+        episode.end = event.event
 
     def _note(self, event: Event, episode: SessionEpisode) -> None:
         run = episode.runs[-1]

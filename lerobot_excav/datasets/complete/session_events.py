@@ -85,12 +85,19 @@ class RestartEvent(_Event):
 
 
 class EndEvent(_Event):
-    """The episode was over."""
+    """The episode was over; so many frames were noted."""
 
-    event: Literal["ended", "discarded", "stopped"]
+    event: Literal["ended", "stopped"]
+    frames: NonNegativeInt
 
 
-Event = SessionEvent | EpisodeEvent | ActionEvent | CommandEvent | HeldEvent | RestartEvent | EndEvent
+class DiscardEvent(_Event):
+    """The episode that ran last was thrown away."""
+
+    event: Literal["discarded"]
+
+
+Event = SessionEvent | EpisodeEvent | ActionEvent | CommandEvent | HeldEvent | RestartEvent | EndEvent | DiscardEvent
 _LINE: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
 
 

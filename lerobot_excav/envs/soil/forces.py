@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Level
 from lerobot_excav.envs.soil.earthmoving import blunt_edge_factor, failure_table
 from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parameters import SoilParameters
@@ -103,10 +103,11 @@ class SoilResistance:
         if corners_w[:, 2].min() + floor_depth_m > weighed_heights_m.max() + CLEAR_M:
             self.forget()
             return Reaction.free(payload_mass_kg, payload_com_t)
-        ground = heights_m, weighed_heights_m, grid
+        ground = heights_m, weighed_heights_m, grid, tool, floor_depth_m
+        ahead = _ahead(tool)
         patches = Patches.joined(
-            self._wedges(*ground, tool, floor_depth_m, GRAVITY_M_S2 * payload_mass_kg),
-            *self._plates(tool.geometry).patches(*ground, tool, floor_depth_m, dt_s),
+            self._wedges(*ground, ahead, GRAVITY_M_S2 * payload_mass_kg),
+            *self._plates(tool.geometry).patches(*ground, ahead, dt_s),
         )
         force, torque = patches.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
         return Reaction(
@@ -124,14 +125,20 @@ class SoilResistance:
         return self._pressure
 
     def _wedges(
-        self, heights_m: Array, weighed_heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, load_n: float
+        self,
+        heights_m: Array,
+        weighed_heights_m: Array,
+        grid: Grid,
+        tool: Tool,
+        floor_depth_m: float,
+        ahead: Level,
+        load_n: float,
     ) -> Patches:
         """Return the wedges before the slices of the edge, with a load of some weight in the bucket."""
         geometry, rotation = tool.geometry, tool.rotation_w
         first = geometry.profile_t[0]
         along, opening = (_direction(rotation, first, geometry.profile_t[k]) for k in (1, -1))
         across = rotation @ -geometry.planes_t[1, :3]
-        ahead = _ahead(rotation, along)
         lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
         edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
         edges = tool.position_w + edges_t @ rotation.T
@@ -152,14 +159,15 @@ def _direction(rotation: Array, start_t: Array, end_t: Array) -> Array:
     return np.asarray(rotation @ (way / np.linalg.norm(way)))
 
 
-def _rake(upwards: Array, ahead: tuple[float, float]) -> float:
+def _rake(upwards: Array, ahead: Level) -> float:
     """Return the angle of a line that rises from the edge, from the horizontal behind it [rad]."""
     return math.atan2(upwards[2], -(upwards[0] * ahead[0] + upwards[1] * ahead[1]))
 
 
-def _ahead(rotation: Array, along: Array) -> tuple[float, float]:
-    """Return the level direction half-way between the line of the plate and the outside of the opening."""
-    level = -(along + rotation[:, 2])[:2]
+def _ahead(tool: Tool) -> Level:
+    """Return the level direction half-way between the line of the bottom plate and the outside of the opening."""
+    profile = tool.geometry.profile_t
+    level = -(_direction(tool.rotation_w, profile[0], profile[1]) + tool.rotation_w[:, 2])[:2]
     length = float(np.hypot(*level))
     if length < 1e-9:
         return 1.0, 0.0

@@ -83,7 +83,7 @@ class Patches:
         return Patches(**{name: array[chosen] for name, array in vars(self).items()})
 
     def bounded(self, total_n: float, *kinds: PatchKind) -> "Patches":
-        """Return the same patches, those of some kinds scaled down so that their limits add up to a total [N] at most."""
+        """Return the same patches, with the limits of some kinds scaled down to add up to a total [N] at most."""
         chosen = np.isin(self.kinds, kinds)
         share = total_n / max(float(self.limits_n[chosen].sum()), total_n)
         return replace(self, limits_n=np.where(chosen, share * self.limits_n, self.limits_n))

@@ -20,7 +20,7 @@ class OuterFaces:
     """Pieces of the bottom and the back of a bucket and of its blunt cutting edge, in its frame.
 
     Each is a strip from a start to an end, straight across the bucket. Both lie on the inside of the plate; the ground
-    meets the plate at one thickness along the normal from there.
+    meets the plate at one thickness along the normal from there. The edge is a line, as thick as the plate.
     """
 
     starts_t: Array  # (m, 3) [m]
@@ -34,11 +34,11 @@ class OuterFaces:
     def of(cls, geometry: ToolGeometry, rows: int) -> "OuterFaces":
         """Cut the profile into pieces, from the edge to the lip, in so many lateral rows."""
         width = geometry.inner_width_m / rows
-        lateral = (np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m
+        lateral: Array = (np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m
         pieces = [_edge_piece(geometry.profile_t)]
         for start, end in zip(geometry.profile_t[:-1], geometry.profile_t[1:], strict=True):
             pieces += _shell_pieces(start, end)
-        starts, ends, normals = (np.array(column) for column in zip(*pieces, strict=True))
+        starts, ends, normals = (np.array(column, dtype=np.float64) for column in zip(*pieces, strict=True))
         is_edge = np.arange(len(pieces)) == 0
         return cls(
             starts_t=_across(starts, lateral),
@@ -52,14 +52,15 @@ class OuterFaces:
     @property
     def areas_m2(self) -> Array:
         """(m,) area of each piece."""
-        return np.asarray(np.linalg.norm(self.ends_t - self.starts_t, axis=1) * self.width_m)
+        lengths = np.linalg.norm(self.ends_t - self.starts_t, axis=1)
+        return np.where(self.is_edge, PLATE_THICKNESS_M, lengths) * self.width_m
 
 
 def _edge_piece(profile_t: Array) -> tuple[Array, Array, Array]:
     """Return start, end and normal (x, z) of the blunt end of the bottom plate."""
     along = profile_t[1] - profile_t[0]
     along = along / np.linalg.norm(along)
-    return profile_t[0], profile_t[0] + PLATE_THICKNESS_M * np.array([along[1], -along[0]]), -along
+    return profile_t[0], profile_t[0], -along
 
 
 def _shell_pieces(start: Array, end: Array) -> list[tuple[Array, Array, Array]]:

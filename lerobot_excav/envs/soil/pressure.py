@@ -11,7 +11,8 @@ The sinkage is how far the soil under a piece has been pressed down. Level trave
 its direction: the sinkage is renewed over the distance from the front of the contact.
 
 The ground meets a plate at its thickness outside of the profile: the cut clears the inside of the plates, so that soil
-which touches one reaches as deep into its outer face. The bearing is whole there and starts from zero at contact.
+which touches one reaches as deep into its outer face. The edge is met where it is, by the soil one cell ahead. The
+bearing starts from zero at contact.
 """
 
 import math
@@ -36,7 +37,7 @@ SINKAGE_EXPONENT = 1.1
 FALL_REACH_M = 0.5
 """Distance over which the fall of the ground is read (guess: about the breadth of the bucket's bottom)."""
 
-_SIDE_ROWS, _SIDE_COLUMNS = 4, 3
+_SIDE_ROWS, _SIDE_COLUMNS = 3, 2
 """Patches over the buried height and the length of a side plate."""
 
 _NO_SLOPE = 0.05
@@ -199,8 +200,9 @@ def shell_limits(
     normals: Array,
     is_edge: Bools,
     width: float,
+    areas: Array,
     rows: int,
-    forward: Level,
+    ways: tuple[Level, Level],
     velocities: Array,
     dt: float,
     sinkages: Array,
@@ -209,25 +211,27 @@ def shell_limits(
     """Return points (m, 3) and greatest pushes (m,) [N] of the soil on the pieces of bottom, back and edge.
 
     Heights are (nx, ny) [m], the weighed ones with what a wedge must lift; starts, ends and normals as in `OuterFaces`,
-    in the world with z above the rigid floor. The bucket is level `forward`; the velocities (m, 3) are those of the
-    pieces. Sinkages change in place.
+    in the world with z above the rigid floor. The ways are the level direction of the bucket, and the one ahead of its
+    edge; the velocities (m, 3) are those of the pieces. Sinkages change in place.
     """
     count = len(starts)
     points, limits = np.zeros((count, 3)), np.zeros(count)
     shares, contacts, depths = np.zeros(count), np.zeros(count), np.zeros(count)
     grounds, falls = np.zeros(count), np.zeros(count)
-    outer_starts, outer_ends = starts + PLATE_THICKNESS_M * normals, ends + PLATE_THICKNESS_M * normals
-    footing, mean = 0.0, np.zeros(3)
+    fronts, footing, mean = standing(heights, grid, starts, ends, normals, is_edge, ways[1]), 0.0, np.zeros(3)
     for k in range(count):
-        a, b = outer_starts[k], outer_ends[k]
-        first = overlap(heights, grid, a[0], a[1], a[2], normals[k])
-        last = overlap(heights, grid, b[0], b[1], b[2], normals[k])
-        shares[k], depth, middle = buried(first, last)
+        a, b = starts[k], ends[k]
+        shares[k], depth, middle = fronts[k]
+        if not is_edge[k]:
+            a, b = a + PLATE_THICKNESS_M * normals[k], b + PLATE_THICKNESS_M * normals[k]
+            first = overlap(heights, grid, a[0], a[1], a[2], normals[k])
+            last = overlap(heights, grid, b[0], b[1], b[2], normals[k])
+            shares[k], depth, middle = buried(first, last)
         points[k] = a + middle * (b - a)
         mean += velocities[k] / count
         if shares[k] > 0.0:
             contacts[k] = min(1.0, depth / PLATE_THICKNESS_M)
-            lowest, grounds[k] = surroundings(heights, grid, points[k, 0], points[k, 1], forward)
+            lowest, grounds[k] = surroundings(heights, grid, points[k, 0], points[k, 1], ways[0])
             depths[k] = max(0.0, lowest - points[k, 2])
             falls[k] = surface_height(heights, grid, points[k, 0], points[k, 1]) - lowest
             if not is_edge[k]:
@@ -235,14 +239,12 @@ def shell_limits(
                 footing += contacts[k] * shares[k] * length * max(0.0, -normals[k, 2]) / rows
     lengths = renewal_lengths(points, shares, is_edge, mean, width)
     press_down(sinkages, grounds, shares, points[:, 2], velocities, lengths, dt)
-    fronts = standing(heights, grid, starts, ends, normals)
     for k in range(count):
-        area = width * math.sqrt(np.sum((ends[k] - starts[k]) ** 2))
-        scale = soil.penetration_scale if is_edge[k] else 1.0
+        area = areas[k] * (soil.penetration_scale if is_edge[k] else 1.0)
         if shares[k] > 0.0 and normals[k, 2] < 0.0:
             breadth = PLATE_THICKNESS_M if is_edge[k] else footing
             bearing = bearing_pressure(sinkages[k], depths[k], breadth, falls[k], soil)
-            limits[k] = scale * area * shares[k] * contacts[k] * normals[k, 2] ** 2 * bearing
+            limits[k] = area * shares[k] * contacts[k] * normals[k, 2] ** 2 * bearing
         if fronts[k, 0] > 0.0:
             if shares[k] <= 0.0:
                 points[k] = starts[k] + fronts[k, 2] * (ends[k] - starts[k])
@@ -251,22 +253,27 @@ def shell_limits(
             else:
                 foot, top = foot_and_top(grid, starts, ends, normals, fronts, rows, k)
                 push = wedge_pressure(weighed, grid, foot, top, normals[k], fronts[k, 1], soil)
-            limits[k] += scale * area * fronts[k, 0] * push
+            limits[k] += area * fronts[k, 0] * push
     return points, limits
 
 
 @kernel
-def standing(heights: Array, grid: Grid, starts: Array, ends: Array, normals: Array) -> Array:
+def standing(
+    heights: Array, grid: Grid, starts: Array, ends: Array, normals: Array, is_edge: Bools, ahead: Level
+) -> Array:
     """Return how much of each piece has soil standing before it: share, mean depth [m] and middle, as in `buried`.
 
-    Level pieces move no soil aside and have none.
+    Level pieces move no soil aside and have none; before the edge, the soil one cell ahead is read.
     """
     fronts = np.zeros((len(starts), 3))
     for k in range(len(starts)):
-        if normals[k, 0] ** 2 + normals[k, 1] ** 2 > _NO_SLOPE**2:
-            a, b = starts[k], ends[k]
-            first = overlap(heights, grid, a[0], a[1], a[2], normals[k])
-            last = overlap(heights, grid, b[0], b[1], b[2], normals[k])
+        a, b, normal = starts[k], ends[k], normals[k]
+        if is_edge[k]:
+            first = overlap(heights, grid, a[0], a[1], a[2], np.array([ahead[0], ahead[1], 0.0]))
+            fronts[k] = buried(first, first)
+        elif normal[0] ** 2 + normal[1] ** 2 > _NO_SLOPE**2:
+            first = overlap(heights, grid, a[0], a[1], a[2], normal)
+            last = overlap(heights, grid, b[0], b[1], b[2], normal)
             fronts[k] = buried(first, last)
     return fronts
 
@@ -309,7 +316,9 @@ def side_limits(
     low, top, surface = math.inf, -math.inf, -math.inf
     for k in range(len(corners)):
         low, top = min(low, corners[k, 2]), max(top, corners[k, 2])
-        surface = max(surface, corners[k, 2] + overlap(heights, grid, corners[k, 0], corners[k, 1], corners[k, 2], normal))
+        surface = max(
+            surface, corners[k, 2] + overlap(heights, grid, corners[k, 0], corners[k, 1], corners[k, 2], normal)
+        )
     level = math.sqrt(normal[0] ** 2 + normal[1] ** 2)
     step = (min(top, surface) - low) / _SIDE_ROWS
     if step <= 0.0 or level < 0.5:  # a bucket that lies on its side is left out
@@ -351,9 +360,19 @@ class PlatePressure:
         self._sinkages_m: Array = np.zeros(len(self._faces.starts_t))
 
     def patches(
-        self, heights_m: Array, weighed_heights_m: Array, grid: Grid, tool: Tool, floor_depth_m: float, dt_s: float
+        self,
+        heights_m: Array,
+        weighed_heights_m: Array,
+        grid: Grid,
+        tool: Tool,
+        floor_depth_m: float,
+        ahead: Level,
+        dt_s: float,
     ) -> tuple[Patches, Patches, Patches]:
-        """Return what the ground holds against shell, edge and side plates; arguments as in `SoilResistance.react`."""
+        """Return what the ground holds against shell, edge and side plates; arguments as in `SoilResistance.react`.
+
+        `ahead` is the level direction in which soil lies before the edge.
+        """
         faces, rotation = self._faces, tool.rotation_w
         ground = heights_m, weighed_heights_m, grid
         raised = tool.position_w + np.array([0.0, 0.0, floor_depth_m])
@@ -367,8 +386,9 @@ class PlatePressure:
             normals,
             faces.is_edge,
             faces.width_m,
+            faces.areas_m2,
             faces.rows,
-            _forward(rotation),
+            (_forward(rotation), ahead),
             velocities,
             dt_s,
             self._sinkages_m,

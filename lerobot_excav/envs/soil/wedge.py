@@ -17,9 +17,9 @@ from lerobot_excav.envs.soil.height_field import Grid, in_grid, surface_height
 _WEDGE_REACH_M = 4.0
 """Longest failure plane followed through the height field."""
 
-_TRIAL_STEP_RAD = math.radians(5.0)
-_TRIALS = 9
-"""Trial planes rise by 0 to 40 degrees; on level ground the tabulated angle is the best and is tried as well."""
+_TRIALS_RAD = tuple(math.radians(angle) for angle in (24.0, 17.0, 11.0, 6.0, 2.5, 0.0, 32.0))
+"""Rise of the trial planes. On level ground the tabulated angle is the best one and is tried before them; before a heap
+flat planes are, which differ most."""
 
 _STEEPEST_RAD = math.radians(179.0)
 """Largest sum of rake, wall friction, failure and friction angle; at 180 degrees a wedge locks."""
@@ -51,44 +51,39 @@ def failure_angle_at(table: Array, rake: float) -> float:
 
 
 @kernel
-def trial_wedges(
-    weighed: Array, grid: Grid, foot: Vector, ahead: Level, failures: Array, balances: Array, extra: float
-) -> Array:
-    """Return area [m2] and length of the failure plane [m] of wedges ahead of a foot, (n, 2).
+def read_profile(
+    weighed: Array, grid: Grid, foot: Vector, ahead: Level, profile: Array, known: int, wanted: int
+) -> int:
+    """Read how far the surface stands above a foot [m] at every cell ahead, as far as wanted; return what is known.
 
-    Each lies between its plane and the surface, from the foot to where these first meet. The surface within one cell
-    of the foot is read one cell ahead: nearer, the tool has taken it already. A wedge resists in proportion to its
-    balance times its area and the extra one that each has; one that already resists more than a finished one is not
-    followed to its end, and gets an infinite area.
+    The surface within one cell of the foot is read one cell ahead: nearer, the tool has taken it already.
     """
-    count, step = len(failures), 0.5 * grid.dx
-    wedges, thicknesses = np.zeros((count, 2)), np.zeros(count)
-    thicknesses[:] = surface_height(weighed, grid, foot[0] + ahead[0] * grid.dx, foot[1] + ahead[1] * grid.dx) - foot[2]
-    growing, reach, least = count, 0.0, math.inf
-    while growing > 0 and reach < _WEDGE_REACH_M:
-        reach += step
-        level = max(reach, grid.dx)
-        surface = surface_height(weighed, grid, foot[0] + ahead[0] * level, foot[1] + ahead[1] * level) - foot[2]
-        growing = 0
-        for j in range(count):
-            thickness = thicknesses[j]
-            if thickness <= 0.0:
-                continue
-            following = surface - reach * math.tan(failures[j])
-            if following > 0.0:
-                wedges[j, 0] += 0.5 * (thickness + following) * step
-                wedges[j, 1] = reach / math.cos(failures[j])
-                growing += 1
-                if (wedges[j, 0] + extra) * balances[j] > least:
-                    following, wedges[j, 0] = 0.0, math.inf
-                    growing -= 1
-            else:
-                share = thickness / (thickness - following)
-                wedges[j, 0] += 0.5 * thickness * step * share
-                wedges[j, 1] = (reach - step + step * share) / math.cos(failures[j])
-                least = min(least, (wedges[j, 0] + extra) * balances[j])
-            thicknesses[j] = following
-    return wedges
+    for i in range(known, wanted):
+        reach = max(i, 1) * grid.dx
+        profile[i] = surface_height(weighed, grid, foot[0] + ahead[0] * reach, foot[1] + ahead[1] * reach) - foot[2]
+    return max(known, wanted)
+
+
+@kernel
+def wedge_end(profile: Array, known: int, step: float, slope: float, most: float) -> tuple[float, float, int]:
+    """Return area [m2] and reach [m] of the wedge between a plane of some slope and a profile sampled every step.
+
+    It reaches from the foot to where they first meet. The area is infinite if it grows beyond the most; and the third
+    number is how much of the profile must be known to go on, or zero at the end.
+    """
+    area, thickness = 0.0, profile[0]
+    for i in range(1, len(profile)):
+        if i >= known:
+            return area, 0.0, i + 1
+        following = profile[i] - i * step * slope
+        if following <= 0.0:
+            share = thickness / (thickness - following)
+            return area + 0.5 * thickness * step * share, (i - 1 + share) * step, 0
+        area += 0.5 * (thickness + following) * step
+        if area > most:
+            return math.inf, i * step, 0
+        thickness = following
+    return area, (len(profile) - 1) * step, 0
 
 
 @kernel
@@ -106,27 +101,27 @@ def passive_force(
     which on level ground is the fundamental equation of earthmoving (`earthmoving`), with the load as its surcharge
     (as in Luengo, Singh and Cannon 1998). The plane is the one with the least force without cohesion.
     """
-    depth = surface_height(weighed, grid, foot[0] + ahead[0] * grid.dx, foot[1] + ahead[1] * grid.dx) - foot[2]
-    if depth <= 0.0:
+    profile = np.empty(1 + int(_WEDGE_REACH_M / grid.dx))
+    known = read_profile(weighed, grid, foot, ahead, profile, 0, 2)
+    if profile[0] <= 0.0:
         return 0.0, 0.0
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
     leaning = rake + soil.steel_friction + soil.friction
-    failures, balances = np.zeros(_TRIALS + 1), np.zeros(_TRIALS + 1)
-    failures[0] = failure_angle_at(soil.table, rake)
-    for j in range(_TRIALS):
-        failures[j + 1] = j * _TRIAL_STEP_RAD
-    for j in range(len(failures)):
-        if leaning + failures[j] > _STEEPEST_RAD:
-            failures[j] = failures[0]
-        balances[j] = math.sin(failures[j] + soil.friction) / math.sin(leaning + failures[j])
-    extra = 0.5 * depth**2 / math.tan(rake) + load / soil.unit_weight
-    wedges = trial_wedges(weighed, grid, foot, ahead, failures, balances, extra)
-    least, best = math.inf, 0
-    for j in range(len(failures)):
-        force = soil.unit_weight * (wedges[j, 0] + extra) * balances[j]
+    extra = 0.5 * profile[0] ** 2 / math.tan(rake) + load / soil.unit_weight
+    least, sticking = math.inf, 0.0
+    for j in range(-1, len(_TRIALS_RAD)):
+        failure = failure_angle_at(soil.table, rake) if j < 0 else _TRIALS_RAD[j]
+        if leaning + failure > _STEEPEST_RAD:
+            continue
+        balance = soil.unit_weight * math.sin(failure + soil.friction) / math.sin(leaning + failure)
+        slope, most, more = math.tan(failure), least / balance - extra, 1
+        while more > 0:
+            area, reach, more = wedge_end(profile, known, grid.dx, slope, most)
+            known = read_profile(weighed, grid, foot, ahead, profile, known, min(more + 7, len(profile)) if more else 0)
+        force = balance * (area + extra)
         if force < least:
-            least, best = force, j
-    sticking = soil.cohesion * wedges[best, 1] * math.cos(soil.friction) / math.sin(leaning + failures[best])
+            least = force
+            sticking = soil.cohesion * reach / math.cos(failure) * math.cos(soil.friction) / math.sin(leaning + failure)
     return least, sticking
 
 

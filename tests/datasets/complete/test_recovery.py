@@ -13,6 +13,7 @@ from toy_reach.spec import REACH
 from lerobot_excav.datasets.complete import recovery
 from lerobot_excav.datasets.complete.recovery import recover_recording
 from lerobot_excav.datasets.complete.resimulation import complete_recording
+from lerobot_excav.datasets.complete.session import read_session
 from lerobot_excav.datasets.format.schema import excav_features
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index
@@ -132,7 +133,8 @@ def test_the_episode_in_hand_is_left_out_and_one_that_the_dataset_counts_is_not(
     result = recover_recording(root, log, out=tmp_path / "b")
     assert (result.episodes, result.lost, result.aside) == (7, 7, None)
     assert contents(root) == before
-    log.write_text(log.read_text() + '{"event": "stopped"}\n')
+    frames = sum(run.actions for run in read_session(log)[7].runs)
+    log.write_text(log.read_text() + json.dumps({"event": "stopped", "frames": frames}) + "\n")
     assert recover_recording(root, log, out=tmp_path / "c").episodes == 7
     (root / "meta" / "info.json").write_text("")
     assert recover_recording(root, log, out=tmp_path / "d").episodes == 8

@@ -3,7 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle, failure_table
+from lerobot_excav.envs.soil.earthmoving import (
+    blunt_edge_factor,
+    earthmoving_factors,
+    failure_angle,
+    failure_table,
+)
 from validation.soil.earthmoving_factors import FACTORS
 
 FRICTION, STEEL = math.radians(39.0), math.radians(26.0)
@@ -43,3 +48,11 @@ def test_the_table_holds_the_same_angles():
         assert angle == pytest.approx(failure_angle(rake, FRICTION, STEEL))
         factors = earthmoving_factors(rake, angle, FRICTION, STEEL)
         assert (cohesion, surcharge) == (factors.cohesion, factors.surcharge)
+
+
+def test_a_smooth_blunt_edge_meets_rankine_and_a_rough_one_more():
+    passive = math.tan(math.pi / 4 + FRICTION / 2) ** 2
+    assert blunt_edge_factor(FRICTION, 0.0) == pytest.approx(passive)
+    rough = [blunt_edge_factor(FRICTION, steel) for steel in np.linspace(0.0, FRICTION, 9)]
+    assert (np.diff(rough) > 0.0).all()
+    assert blunt_edge_factor(FRICTION, 1.1 * FRICTION) > 0.0

@@ -12,7 +12,6 @@ from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_ang
 from lerobot_excav.envs.soil.forces import SoilResistance, bearing_factors, blade_force_n
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.patches import PatchKind
-from lerobot_excav.envs.soil.wedge import PENETRATION_CAP_N
 from validation.soil.reference.worlds import flat
 
 SAND = PRESETS["sand"]
@@ -81,29 +80,57 @@ def test_a_blade_meets_the_fundamental_equation_of_earthmoving(rake, depth, widt
 
 def test_a_heap_ahead_counts_and_turns_the_bucket_if_it_is_on_one_side():
     tool, level, heaped, one_sided = dragged(40, 0.3), flat(), flat(), flat()
-    heaped.heights[:50] += 0.3
+    heaped.heights[:58] += 0.3  # from 0.1 m before the edge on
     one_sided.heights[:, 60:] += 0.3
     more, less = (np.linalg.norm(force(SAND, field, tool, PatchKind.WEDGE)) for field in (heaped, level))
     assert more > 1.5 * less
     assert abs(react(SAND, one_sided, tool).torque_w_nm[2]) > 100.0
 
 
-def bearing(depth, scale=1.0):
-    soil = dataclasses.replace(SAND, penetration_scale=scale)
-    return -float(force(soil, flat(), dragged(45, depth, INTO), PatchKind.PENETRATION) @ INTO)
+def plunge(soil, depths, way=(0.0, 0.0, -1.0)):
+    """Push the edge down along an upright plate, on ground that is not cut; return the resistance at each depth."""
+    resistance, found = SoilResistance(soil, 8), []
+    for depth in depths:
+        tool = tool_at(np.array([0.0, 0.0, 1.0 - depth]), math.radians(90.0) - PLATE_RAD, np.array(way), 0.0)
+        patches = answer(resistance, flat(), tool).patches.of_kind(PatchKind.PENETRATION)
+        force, _ = patches.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
+        found.append(float(force[2]))
+    return found
 
 
-def test_the_edge_bears_more_as_it_goes_deeper_over_the_ramp_and_to_a_cap():
-    """Straight in, against bearing theory times a ramp from 10 to 100 percent over 0.2 m."""
+def test_an_edge_that_is_pushed_straight_down_meets_the_bearing_capacity_in_the_end():
+    """Prandtl-Reissner and Vesic, from zero at contact."""
     _, depth_factor, width_factor = bearing_factors(SAND.friction_angle_rad)
     assert depth_factor == pytest.approx(56.0, rel=0.01)
     assert width_factor == pytest.approx(92.2, rel=0.01)
-    area = (0.02 + 5 * 0.06 * 0.015 / 0.7) * BUCKET.inner_width_m
-    for depth, ramp in ((0.1, 0.55), (0.2, 1.0), (0.3, 1.0)):
-        stress = SAND.density_kg_m3 * GRAVITY_M_S2 * (depth * depth_factor + 0.5 * 0.02 * width_factor)
-        assert bearing(depth) == pytest.approx(ramp * stress * area, rel=0.01)
-    assert bearing(0.2, scale=2.0) == pytest.approx(2 * bearing(0.2))
-    assert bearing(0.4, scale=99.0) == pytest.approx(PENETRATION_CAP_N, rel=1e-3)
+    depths = np.arange(-0.04, 0.4, 0.02)
+    found = plunge(SAND, depths)
+    assert found[0] == 0.0
+    assert (np.diff(found) >= 0.0).all()
+    stress = SAND.density_kg_m3 * GRAVITY_M_S2 * (depths[-1] * depth_factor + 0.5 * 0.02 * width_factor)
+    assert found[-1] == pytest.approx(stress * 0.02 * BUCKET.inner_width_m, rel=0.05)
+    harder = dataclasses.replace(SAND, penetration_scale=2.0)
+    assert plunge(harder, depths)[-1] == pytest.approx(2.0 * found[-1])
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.2, 0.4])
+def test_an_edge_that_is_dragged_level_adds_little_to_its_wedge(depth):
+    """The soil before it fails with the wedge; the edge's bearing carried half of all digging work."""
+    tool = dragged(35, depth)
+    wedge, edge = (-force(SAND, flat(), tool, kind) @ FULL_SPEED for kind in (PatchKind.WEDGE, PatchKind.PENETRATION))
+    assert 0.0 < edge < 0.35 * wedge
+
+
+def test_the_load_weighs_on_the_draught():
+    """3568 N with 7 kg in the bucket and 3579 N with 156 kg were seen."""
+    tool, found = dragged(30, 0.2), []
+    for load in (7.0, 80.0, 156.0):
+        reaction = SoilResistance(SAND, 8).react(
+            *(flat().heights,) * 2, flat().grid, tool, 0.0, TICK_S, load, np.array([0.5, 0.0, 0.3])
+        )
+        found.append(float(reaction.force_w_n[0]))
+    assert found[0] < found[1] < found[2]
+    assert found[2] - found[0] > 0.4 * (156.0 - 7.0) * GRAVITY_M_S2
 
 
 @given(
@@ -125,14 +152,14 @@ def test_the_soil_never_drives_the_bucket(pitch, depth, velocity, turning):
 
 @given(pitch=st.floats(-3.0, -1.4), depth=st.floats(0.05, 0.5), angle=st.floats(0.0, 2 * math.pi))
 @settings(max_examples=50)
-def test_what_the_soil_can_hold_depends_on_the_pose_and_not_on_the_motion(pitch, depth, angle):
-    """Nothing can jump with the direction of motion: for the first step, before any sinkage."""
+def test_what_the_wedge_can_hold_depends_on_the_pose_and_not_on_the_motion(pitch, depth, angle):
+    """Nothing can jump with the direction of motion."""
     edge = np.array([0.0, 0.0, 1.0 - depth])
     still = react(SAND, flat(), tool_at(edge, pitch, np.zeros(3), 0.0)).patches
     motion = np.array([math.cos(angle), 0.0, math.sin(angle)])
     moving = react(SAND, flat(), tool_at(edge, pitch, motion, 0.0)).patches
-    for kind in (PatchKind.WEDGE, PatchKind.PENETRATION):
-        np.testing.assert_array_equal(moving.of_kind(kind).full_forces_w_n, still.of_kind(kind).full_forces_w_n)
+    one, other = (patches.of_kind(PatchKind.WEDGE).full_forces_w_n for patches in (moving, still))
+    np.testing.assert_array_equal(one, other)
 
 
 def test_the_force_is_continuous_in_the_direction_of_a_deep_scrape():

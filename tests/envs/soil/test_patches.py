@@ -68,3 +68,12 @@ def test_joined_patches_can_be_told_apart_by_kind_and_those_that_hold_nothing_ar
     joined = Patches.joined(floor_patch(), wedges, Patches.none())
     assert [len(joined), *(len(joined.of_kind(kind)) for kind in PatchKind)] == [3, 2, 0, 1]
     np.testing.assert_array_equal(joined.of_kind(PatchKind.WEDGE).full_forces_w_n, [[5, 0, 0], [0, 0, 7]])
+
+
+def test_the_patches_of_some_kinds_can_be_held_to_a_total():
+    wedges = Patches.alike(np.eye(3), np.eye(3), np.array([5.0, 6.0, 7.0]), 0.4, PatchKind.WEDGE)
+    joined = Patches.joined(wedges, floor_patch(1000.0), floor_patch(3000.0))
+    bounded = joined.bounded(400.0, PatchKind.PRESSURE)
+    np.testing.assert_allclose(bounded.limits_n, [5.0, 6.0, 7.0, 100.0, 300.0])
+    np.testing.assert_array_equal(joined.bounded(4000.0, PatchKind.PRESSURE).limits_n, joined.limits_n)
+    assert len(Patches.none().bounded(400.0, PatchKind.PRESSURE)) == 0

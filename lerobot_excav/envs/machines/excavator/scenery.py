@@ -20,7 +20,7 @@ PLUMB_LINE = ("plumb_line", "plumb_foot")
 _HORIZON_RGB = (0.80, 0.85, 0.90)
 _ZENITH_RGB = (0.33, 0.55, 0.83)
 _CLEAR_ALPHA = 0.3
-_SAMPLES, _SHADOW_MAP_PX = 4, 2048
+_SAMPLES, _SHADOW_MAP_PX = 4, 4096
 _PLUMB_RADIUS_M, _FOOT_RADIUS_M = 0.014, 0.09
 _PLUMB_RGBA = (0.95, 0.98, 1.0, 1.0)
 _ANYWHERE = [0.0, 0.0, 1.0]  # not where its body is, or MuJoCo would never look at its place again
@@ -49,7 +49,7 @@ def build_scenery(container: Container) -> mujoco.MjModel:
 def _light(spec: mujoco.MjSpec) -> None:
     """Let the sun cast shadows, open the sky, and let the ground fade into it."""
     spec.light("sun").castshadow = True
-    spec.visual.map.shadowclip = 2.6  # wide: near the border of its map the ground shadows itself in specks
+    spec.visual.map.shadowclip = 4.0  # wide: near the border of its map the ground shadows itself in specks
     spec.visual.map.zfar = 30.0
     spec.visual.map.fogstart, spec.visual.map.fogend = 4.0, 26.0
     spec.visual.rgba.fog = [*_HORIZON_RGB, 1.0]

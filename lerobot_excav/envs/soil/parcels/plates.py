@@ -135,6 +135,17 @@ def _wall_velocity(rotation: Array, linear: Array, angular: Array, c: Vector) ->
 
 
 @kernel
+def _give(
+    pushes: Array, position: Array, rotation: Array, c: Vector, force: Vector, dt: float, normal: Vector, stopped: float
+) -> None:
+    """Add what a parcel gives to the tool point c: the opposite of a force [N] on it and of what `keep_out` stopped."""
+    arm = turned(rotation, c)
+    point = (position[0] + arm[0], position[1] + arm[1], position[2] + arm[2])
+    add_impulse(pushes, point, force, -dt)
+    add_impulse(pushes, point, normal, -stopped)
+
+
+@kernel
 def press_bucket(
     state: State, step: int, tool: ToolPath, opening_margin: float, law: Law, dt: float, pushes: Array
 ) -> None:
@@ -191,14 +202,7 @@ def press_bucket(
             w = (spins[i, 0], spins[i, 1], spins[i, 2])
             force, torque = wall_contact(springs, row, n, gap, v, w, masses[i], r, law, dt)
             if not load[i] and side <= 0.0:
-                stopped = masses[i] * (dot(v, n) - closing)
-                given = (
-                    force[0] * dt + stopped * n[0],
-                    force[1] * dt + stopped * n[1],
-                    force[2] * dt + stopped * n[2],
-                )
-                at = turned(rotation, c)
-                add_impulse(pushes, (position[0] + at[0], position[1] + at[1], position[2] + at[2]), given, -1.0)
+                _give(pushes, position, rotation, c, force, dt, n, masses[i] * (dot(v, n) - closing))
             for a in range(3):
                 forces[i, a] += force[a]
                 torques[i, a] += torque[a]

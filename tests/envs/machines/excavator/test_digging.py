@@ -206,3 +206,17 @@ def test_a_bucket_that_stalls_in_deep_soil_holds_still_without_chatter(machine, 
         speeds.append(machine.joint_vel)
     jumps = np.abs(np.diff(speeds[-40:], axis=0))
     assert np.median(jumps, axis=0).max() < 0.01
+
+
+def test_the_ground_pushes_plates_no_harder_than_the_machine_weighs(machine):
+    machine.reset(REACHED_OUT)
+    resistance = JointResistance(machine.model)
+    weight_n = 9.81 * (2600.0 + 4300.0 + 520.0 + 270.0 + 210.0)
+    up = np.array([[0.0, 0.0, 1.0]])
+    for size in (1e4, 3e6):
+        ground = Patches.alike(machine.tool().position_w[None], up, np.array([size]), 0.0, PatchKind.PRESSURE)
+        resistance.set_reaction(reaction_of(ground), machine.data)
+        machine.data.qfrc_applied[:] = 0.0
+        machine.data.qvel[:] = [0.0, -50.0, 0.0, 0.0]  # the boom falls: no push ends this motion
+        resistance.apply(machine.data)
+        assert np.linalg.norm(resistance.force_w_n) == pytest.approx(min(size, weight_n), rel=1e-3)
