@@ -150,7 +150,7 @@ def _worker(root: Path, fidelity: str) -> Any:
     command = [sys.executable, __file__, "--serve", f"--fidelity={fidelity}"]
     environment = {**os.environ, "PYTHONPATH": str(root)}
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, cwd=root, env=environment, text=True, stdin=pipe, stdout=pipe)
+    return subprocess.Popen(command, cwd=root, env=environment, encoding="utf-8", stdin=pipe, stdout=pipe)
 
 
 def _answer(worker: Any, question: str = "") -> str:
