@@ -4,13 +4,13 @@ Prints every measured value beside its gate. With --report it also writes the re
 is 1 if a gate is missed; times, which depend on the machine, do not count for it. Run it from the repository's root.
 
 Examples:
-  python -m validation.soil --quick --only=T3,T12
+  python -m validation.soil --quick --only=heap,ledger
       a heap of sand and the mass ledger, in half a minute
   python -m validation.soil --fidelity=fine --soil=gravel --json=outputs/soil.json
       everything; experiments made with one kind of sand keep to it
   python -m validation.soil --report
       everything, and docs/explanation/soil_validation.md with docs/explanation/images/soil/*.png
-  python -m validation.soil --quick --only=T1 --report=outputs/columns.md
+  python -m validation.soil --quick --only=column_collapse --report=outputs/columns.md
       the report of a part, with its plots in outputs/images/soil
 """
 
@@ -35,10 +35,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "python -m validation.soil",
         description=__doc__,
-        epilog="\n".join(["experiments:", *(f"  {one.code:4} {one.title}" for one in catalogue.EXPERIMENTS)]),
+        epilog="\n".join(["experiments:", *(f"  {one.name:20} {one.title}" for one in catalogue.EXPERIMENTS)]),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--only", metavar="T1,T3", help="codes of experiments (default: all)")
+    parser.add_argument("--only", metavar="heap,ledger", help="names of experiments (default: all)")
     parser.add_argument("--soil", choices=PRESETS, default="sand", help="soil preset (default: sand)")
     parser.add_argument("--fidelity", choices=FIDELITIES, default="standard", help="default: standard")
     parser.add_argument("--seeds", type=_seeds, default=(0, 1, 2), help="of random arrangements (default: 0,1,2)")
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(summary_text(*outcomes[-1]), flush=True)
     if given.json is not None:
         values = {name: getattr(given, name) for name in ("soil", "fidelity", "seeds", "quick")}
-        values["experiments"] = {experiment.code: result.as_dict() for experiment, result in outcomes}
+        values["experiments"] = {experiment.name: result.as_dict() for experiment, result in outcomes}
         write_whole(given.json, to_json(values, indent=1, inf_nan_mode="null") + b"\n")
     if given.report is not None:
         write_report(outcomes, conditions, given.report)

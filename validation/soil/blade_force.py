@@ -1,4 +1,4 @@
-"""T5: the force kernel on a plane blade, against formulas for cutting dry sand (measured ones: `moving_blade`)."""
+"""The force kernel on a plane blade, against formulas for cutting dry sand (measured ones: `moving_blade`)."""
 
 import dataclasses
 import math
@@ -47,7 +47,7 @@ def total_force_n(rake_deg: float, depth_m: float) -> float:
 
 
 @experiment(
-    code="T5",
+    name="blade_force",
     title="Formulas for a blade",
     source="Hatamura and Chijiiwa 1977, as in Miedema, The Delft Sand, Clay and Rock Cutting Model, ch. 11 (their "
     "measured forces are in figures; the gate is the bracket of three theories for their sand and blade: it is a "

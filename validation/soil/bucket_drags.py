@@ -63,7 +63,7 @@ def _turn(azimuth_rad: float) -> Array:
 
 
 @experiment(
-    code="T18",
+    name="bucket_drags",
     title="The bucket dragged every way",
     source="Passive wedges: Rankine, Reece 1965 (formulas: they bracket, and do not count as measurements)",
     measures="The bucket is dragged level through fresh ground, 5 cm and 0.3 m deep, edge first, shell first and to "
@@ -76,7 +76,7 @@ def run(conditions: Conditions) -> Result:
     soil = Soil(conditions.preset, EXTENT_M, 0.05, conditions.fidelity, floor_depth_m=FLOOR_M)
     azimuths = AZIMUTHS_RAD[1:2] if conditions.quick else AZIMUTHS_RAD
     checks, rows = [], []
-    for azimuth in track(azimuths, "T18 azimuths"):
+    for azimuth in track(azimuths, "azimuths"):
         first = {
             (way, depth): float(drag(CARRYING_RAD, depth, ahead, 0.0, azimuth, soil)[0, 1])
             for way, ahead in WAYS.items()

@@ -8,19 +8,19 @@ from validation.soil.experiment import SoilExperiment
 _FILES = (
     *("column_collapse", "wall_collapse", "ridge", "standing_cut", "heap", "blade_force", "earthmoving_factors"),
     *("moving_blade", "bucket_drags", "digging_work", "operator_cycle", "free_fall", "ledger", "determinism"),
-    *("stall", "force_ramp", "speed"),
+    *("stall", "force_ramp", "speed", "newton_peer"),
 )
 EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 
 
-def chosen(codes: str | None) -> list[SoilExperiment]:
-    """Return experiments by their codes, which commas separate, in the order of the report; None for all.
+def chosen(given: str | None) -> list[SoilExperiment]:
+    """Return experiments by their names, which commas separate, in the order of the report; None for all.
 
     Raises:
-        ConfigurationError: A code is unknown.
+        ConfigurationError: A name is unknown.
     """
-    by_code = {experiment.code: experiment for experiment in EXPERIMENTS}
-    names = list(by_code) if codes is None else [name.strip() for name in codes.split(",")]
+    by_name = {experiment.name: experiment for experiment in EXPERIMENTS}
+    names = list(by_name) if given is None else [name.strip() for name in given.split(",")]
     for name in names:
-        require_choice("--only", name, by_code)
-    return [experiment for code, experiment in by_code.items() if code in names]
+        require_choice("--only", name, by_name)
+    return [experiment for name, experiment in by_name.items() if name in names]

@@ -1,4 +1,4 @@
-"""T1: an axisymmetric column of dry grains is released and spreads.
+"""An axisymmetric column of dry grains is released and spreads.
 
 The run-out (r - r0) / r0 grows like the aspect ratio a = h0 / r0 for low columns and like its square root for tall
 ones. A height field that only relaxes to its repose angle has no inertia: it ends as the cone of the same volume,
@@ -30,7 +30,7 @@ Found = dict[float, list[list[Collapse]]]
 
 
 @experiment(
-    code="T1",
+    name="column_collapse",
     title="Collapse of a column",
     source="Lube et al. 2004, J. Fluid Mech. 508:175; Lajeunesse et al. 2004, Phys. Fluids 16:2371",
     measures="Parcels fill a cylinder on an empty floor and are let go. The run-out is that of the radius that holds "
@@ -43,7 +43,7 @@ def run(conditions: Conditions) -> Result:
     low = QUICK_LOW_ASPECTS if conditions.quick else LOW_ASPECTS
     tall = QUICK_TALL_ASPECTS if conditions.quick else TALL_ASPECTS
     found: Found = {}
-    for phi, aspect in track([(p, a) for p in FRICTIONS_DEG for a in (*low, *tall)], "T1 columns"):
+    for phi, aspect in track([(p, a) for p in FRICTIONS_DEG for a in (*low, *tall)], "columns"):
         sand = sand_with_friction(phi)
         runs = [collapse(sand, aspect, fidelity=conditions.fidelity, seed=seed) for seed in conditions.repeats]
         found.setdefault(phi, []).append(runs)

@@ -1,4 +1,4 @@
-"""T13: the same seed and the same motion give the same bits."""
+"""The same seed and the same motion give the same bits."""
 
 import hashlib
 
@@ -22,7 +22,7 @@ def trace(soil: Soil, *, quick: bool) -> str:
 
 
 @experiment(
-    code="T13",
+    name="determinism",
     title="Determinism",
     source="Repeatability of an experiment",
     measures="A dig cycle, the same again after a reset, and the same in another soil object, for every soil and "
@@ -33,7 +33,7 @@ def run(conditions: Conditions) -> Result:
     """Dig the same cycle in two soils and once more after a reset, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
     different = unequal = 0
-    for preset, fidelity in track(cases(conditions), "T13 repeats"):
+    for preset, fidelity in track(cases(conditions), "repeats"):
         soil = pile(preset, fidelity, conditions.seeds[0])
         first = trace(soil, quick=conditions.quick)
         heights = cone(soil)

@@ -80,7 +80,7 @@ def work_of_a_cycle_j(settings: DemonstrationSettings, pair: Pair) -> tuple[dict
 
 
 @experiment(
-    code="T19",
+    name="digging_work",
     title="What carries the digging work",
     source="Our own: no number that was guessed may carry more than a tenth of the work",
     measures=f"The scripted operator digs, lifts, swings and dumps; the work that wedge, blunt edge and plates take "
@@ -94,7 +94,7 @@ def run(conditions: Conditions) -> Result:
     settings = DemonstrationSettings.of("excavator", env, scenes=scenes, targets=1)
     rows: list[tuple[float | str, ...]] = []
     totals, successes = np.zeros(len(PatchKind)), 0
-    for pair in track(settings.pairs(), "T19 cycles"):
+    for pair in track(settings.pairs(), "cycles"):
         works, success = work_of_a_cycle_j(settings, pair)
         mine = np.array([works[kind] for kind in PatchKind])
         totals, successes = totals + mine, successes + success

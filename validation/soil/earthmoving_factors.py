@@ -1,4 +1,4 @@
-"""T6: the fundamental equation of earthmoving, against tables computed apart from this code."""
+"""The fundamental equation of earthmoving, against tables computed apart from this code."""
 
 import math
 
@@ -24,7 +24,7 @@ FACTORS = (
 
 
 def blade_force_n(rake_deg: float, depth_m: float, *, density: float, width_m: float) -> float:
-    """Return the force [N] of the equation on the blade of T5 in dry sand of some density."""
+    """Return the force [N] of the equation on the blade of `blade_force` in dry sand of some density."""
     rake, sand = math.radians(rake_deg), blade_sand()
     friction, steel = sand.friction_angle_rad, sand.steel_friction_angle_rad
     weight = earthmoving_factors(rake, failure_angle(rake, friction, steel), friction, steel).weight
@@ -32,7 +32,7 @@ def blade_force_n(rake_deg: float, depth_m: float, *, density: float, width_m: f
 
 
 @experiment(
-    code="T6",
+    name="earthmoving_factors",
     title="Factors of earthmoving",
     source="Reece 1965, McKyes 1985: the fundamental equation of earthmoving; dry sand of Hatamura and Chijiiwa 1977 "
     "(a check of the formula, and no validation)",

@@ -35,7 +35,7 @@ class SoilExperiment:
     """One experiment: how it is run, and in words where its numbers come from, what it measures and its gate."""
 
     run: Callable[[Conditions], Result]
-    code: str  # as in `--only`
+    name: str  # that of its file, as in `--only`
     title: str
     source: str
     measures: str
@@ -46,7 +46,7 @@ class SoilExperiment:
     @property
     def anchor(self) -> str:
         """Where a link to its section of the report leads, as Markdown names it."""
-        title = f"{self.code} {self.title}".lower().replace(" ", "-")
+        title = self.title.lower().replace(" ", "-")
         return "".join(c for c in title if c.isalnum() or c == "-")
 
     def reason(self, check: Check) -> str:

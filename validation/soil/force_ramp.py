@@ -1,4 +1,4 @@
-"""T16: the digging force begins at the surface and grows without a jump."""
+"""The digging force begins at the surface and grows without a jump."""
 
 import math
 
@@ -39,7 +39,7 @@ def force_at_n(soil: Soil, depth_m: float, rake_deg: float) -> float:
 
 
 @experiment(
-    code="T16",
+    name="force_ramp",
     title="Force against digging depth",
     source="Earthmoving and bearing theory; depth ramp of AGX Terrain",
     measures="A bucket 0.72 m wide is dragged through fresh, level ground, from 5 cm above it to 0.4 m below.",
@@ -52,7 +52,7 @@ def run(conditions: Conditions) -> Result:
     depths = np.asarray(np.linspace(-HIGHEST_M, DEEPEST_M, count), dtype=np.float64)
     soil = Soil(conditions.preset, (4.0, 4.0), 0.05, conditions.fidelity)
     forces = {
-        rake: np.array([force_at_n(soil, float(d), rake) for d in depths]) for rake in track(RAKES_DEG, "T16 rakes")
+        rake: np.array([force_at_n(soil, float(d), rake) for d in depths]) for rake in track(RAKES_DEG, "rakes")
     }
     above = max(float(f[depths <= 0.0].max()) for f in forces.values())
     steepest = max(float(np.abs(np.diff(f)).max()) / spacing / float(f[-1]) for f in forces.values())

@@ -1,4 +1,4 @@
-"""T11: parcels in the air obey Newton: fall time, centre of mass, energy."""
+"""Parcels in the air obey Newton: fall time, centre of mass, energy."""
 
 import math
 
@@ -91,7 +91,7 @@ def energies_of_a_dump_j(*, preset: str, fidelity: str, seed: int) -> Array:
 
 
 @experiment(
-    code="T11",
+    name="free_fall",
     title="Free fall and dump",
     source="Mechanics: t = √(2h/g); the centre of mass of a cloud is moved by gravity only; friction takes energy",
     measures="Single parcels fall from 0.25 m to 2 m. A contracting cloud of parcels collides with itself in the air "
@@ -108,8 +108,8 @@ def run(conditions: Conditions) -> Result:
     common = {"preset": conditions.preset, "fidelity": conditions.fidelity}
     times = [(h, fall_time_s(h, **common), math.sqrt(2.0 * h / GRAVITY_M_S2)) for h in HEIGHTS_M]
     seeds = conditions.repeats
-    drifts = [drift_in_the_air_m(**common, seed=seed) for seed in track(seeds, "T11 clouds in the air")]
-    dumps = [energies_of_a_dump_j(**common, seed=seed) for seed in track(seeds, "T11 dumps")]
+    drifts = [drift_in_the_air_m(**common, seed=seed) for seed in track(seeds, "clouds in the air")]
+    dumps = [energies_of_a_dump_j(**common, seed=seed) for seed in track(seeds, "dumps")]
     drift = max(horizontal for horizontal, _ in drifts)
     time_error = max(abs(found / law - 1.0) for _, found, law in times)
     growth = max(float(np.diff(energies).max()) / float(energies[0]) for energies in dumps)

@@ -1,4 +1,4 @@
-"""T3: soil poured on a plane makes a cone at its angle of repose."""
+"""Soil poured on a plane makes a cone at its angle of repose."""
 
 import math
 from itertools import chain
@@ -106,7 +106,7 @@ SLOPE_OF_PARCELS = (
 
 
 @experiment(
-    code="T3",
+    name="heap",
     title="Heap and repose",
     source="The cone of a volume V: h = (3 V tan² θ / π)^(1/3); repose angle of the preset, as AGX Terrain takes it",
     measures="485 kg leave a funnel whose mouth stands still 0.15 m above the top of the ideal cone. Straight lines "
@@ -124,7 +124,7 @@ def run(conditions: Conditions) -> Result:
     checks: list[Check] = []
     rows: list[tuple[float | str, ...]] = []
     profiles = []
-    for preset, dt_s in track(cases, "T3 heaps"):
+    for preset, dt_s in track(cases, "heaps"):
         heaps = [pour_heap(preset, fidelity=conditions.fidelity, seed=s, dt_s=dt_s) for s in seeds]
         label = preset if dt_s == TICK_S else f"{preset}, {dt_s} s per step"
         checks += _checks(label, heaps)

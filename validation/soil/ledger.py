@@ -1,4 +1,4 @@
-"""T12: no kilogram appears or vanishes."""
+"""No kilogram appears or vanishes."""
 
 import math
 
@@ -11,7 +11,7 @@ TOLERANCE_KG = 1e-6
 
 
 @experiment(
-    code="T12",
+    name="ledger",
     title="Mass ledger",
     source="Conservation of mass",
     measures="Grid, parcels, bucket, box and out of bounds are added up after every step of a dig cycle with a dump "
@@ -22,7 +22,7 @@ def run(conditions: Conditions) -> Result:
     """Add the ledger up after every step of a dig cycle, for every soil and fidelity."""
     rows: list[tuple[float | str, ...]] = []
     worst, lowest, least = 0.0, math.inf, math.inf
-    for preset, fidelity in track(cases(conditions), "T12 ledgers"):
+    for preset, fidelity in track(cases(conditions), "ledgers"):
         soil = pile(preset, fidelity, conditions.seeds[0])
         total, error = sum(soil.ledger_kg().values()), 0.0
         for _ in dig(soil, quick=conditions.quick):

@@ -84,7 +84,7 @@ def drag(
 
 
 @experiment(
-    code="T17",
+    name="moving_blade",
     title="A blade dragged through sand",
     source="Obermayr, Vrettos, Kleinert and Eberhard 2013, Fraunhofer ITWM report 228, section 3.1 and figures 9 and "
     "10 (doi 10.1016/j.jterra.2011.08.003 is the article before it), as digitised in "
@@ -100,7 +100,7 @@ def run(conditions: Conditions) -> Result:
     cases = pairwise_cover(AXES)
     cases = cases[::5] if conditions.quick else cases
     rows, checks, ratios = [], [], []
-    for case in track(cases, "T17 drags"):
+    for case in track(cases, "drags"):
         found = drag(washed_sand(), **case)
         width, depth = case["width_m"], case["depth_m"]
         mean, measured = float(found[found[:, 0] >= FROM_M, 1].mean()), MEASURED_N[width][DEPTHS_M.index(depth)]

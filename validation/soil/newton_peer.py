@@ -30,7 +30,7 @@ class _Pair(NamedTuple):
 
 
 @experiment(
-    code="newton_peer",
+    name="newton_peer",
     title="A peer: Newton's implicit material point method",
     source="Newton 1.x, https://github.com/newton-physics/newton; law: Lube et al. 2004, J. Fluid Mech. 508:175",
     measures="The same columns of sand, one after the other in one process on one machine: radius that holds 99 % of "

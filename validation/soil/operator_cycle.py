@@ -1,4 +1,4 @@
-"""T8: a full bucket of sand brings 485 kg into the box, as a person's did in AGX Terrain."""
+"""A full bucket of sand brings 485 kg into the box, as a person's did in AGX Terrain."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SCENES, QUICK_SCENES = 8, 2
 
 
 @experiment(
-    code="T8",
+    name="operator_cycle",
     title="An operator's cycle",
     source="Retained mass of a person's cycles in AGX Terrain, sand at 1474 kg/m³ and 39°: 485 ± 65 kg",
     measures="The scripted operator digs, lifts, swings and dumps once per scene; the mass in the box at the end.",
@@ -26,7 +26,7 @@ def run(conditions: Conditions) -> Result:
     scenes = QUICK_SCENES if conditions.quick else SCENES
     settings = DemonstrationSettings.of("excavator", env, scenes=scenes, targets=1)
     rows: list[tuple[float | str, ...]] = []
-    for pair in track(settings.pairs(), "T8 cycles"):
+    for pair in track(settings.pairs(), "cycles"):
         episode = play_demonstration(settings, pair, with_images=False)
         retained = float(episode.metrics["retained_mass_kg"])
         residual = float(episode.metrics["residual_bucket_mass_kg"])

@@ -57,6 +57,6 @@ def summary_text(experiment: SoilExperiment, result: Result) -> str:
     """Return one line per gated value, for a terminal."""
     lines = []
     for check in result.checks:
-        line = f"{experiment.code:4} {check.name:62} {check.text(check.value):>14}   gate {check.gate_text}"
+        line = f"{experiment.name:20} {check.name:62} {check.text(check.value):>14}   gate {check.gate_text}"
         lines.append(line if check.passed else f"{line}   MISSED by {check.text(check.missed_by)}")
     return "\n".join(lines)

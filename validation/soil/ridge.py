@@ -26,7 +26,7 @@ QUICK_CASES = (22.5, 0.1), (40.0, 0.05)
 
 
 @experiment(
-    code="ridge",
+    name="ridge",
     title="Ridge in any direction",
     source="A slope of dry sand rests at its friction angle, whatever its azimuth",
     measures="The flanks of a long ridge, 2° steeper and 0.5° flatter than repose, that face azimuths between those of "

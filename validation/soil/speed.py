@@ -1,4 +1,4 @@
-"""T14: how long a step of 0.02 s takes on one core of this machine."""
+"""How long a step of 0.02 s takes on one core of this machine."""
 
 import os
 import platform
@@ -27,7 +27,7 @@ _FALL_TICKS = 12
 
 
 @experiment(
-    code="T14",
+    name="speed",
     title="Speed",
     source="Needs of training and of a person at the controls",
     measures="Wall time of every step of a dig cycle, of a falling column of 1000 parcels, and of columns and grids of "

@@ -1,4 +1,4 @@
-"""T15: the soil can hold the machine, but it never drives it."""
+"""The soil can hold the machine, but it never drives it."""
 
 import dataclasses
 from typing import NamedTuple
@@ -89,7 +89,7 @@ def _arm_direction(machine: ExcavatorMachine) -> Array:
 
 
 @experiment(
-    code="T15",
+    name="stall",
     title="Stall and energy",
     source="Mechanics: resistance is no drive; friction holds what rests",
     measures="The machine lowers its bucket into level ground, drags it, holds it for 6 s, drags on and lifts: in the "
@@ -101,7 +101,7 @@ def run(conditions: Conditions) -> Result:
     """Dig in the soil and in hard ground."""
     parameters = PRESETS[conditions.preset]
     soils = {conditions.preset: parameters, "hard ground": hard_ground(parameters)}
-    digs = {name: dig(soil, fidelity=conditions.fidelity) for name, soil in track(list(soils.items()), "T15 digs")}
+    digs = {name: dig(soil, fidelity=conditions.fidelity) for name, soil in track(list(soils.items()), "digs")}
     checks, rows = [], []
     for name, one in digs.items():
         checks += _checks(name, one)

@@ -62,7 +62,7 @@ def motion_m(case: Case, height_m: float) -> tuple[float, float]:
 
 
 @experiment(
-    code="standing_cut",
+    name="standing_cut",
     title="Cuts that stand",
     source="Culmann's critical height of a face at the angle i: 4 c/γ sin i cos φ / (1 − cos(i − φ)); at 90° "
     "4 c/γ tan(45° + φ/2)",

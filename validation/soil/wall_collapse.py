@@ -78,7 +78,7 @@ def let_go(case: Case) -> Fall:
 
 
 @experiment(
-    code="wall_collapse",
+    name="wall_collapse",
     title="Collapse of a wall",
     source="Stop time of collapsing columns, 2.5 to 3 √(h/g): Lube et al. 2004, J. Fluid Mech. 508:175, and Lajeunesse "
     "et al. 2004, Phys. Fluids 16:2371",

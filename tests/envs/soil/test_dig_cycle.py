@@ -41,7 +41,7 @@ def cycle():
 
 
 def test_the_bucket_fills_as_an_operator_fills_it_and_loses_next_to_nothing_of_its_sleeping_load(cycle):
-    """The band of experiment T8: 485 +- 65 kg."""
+    """The band of the experiment operator_cycle: 485 +- 65 kg."""
     held = cycle.held_kg("bucket")
     assert 420.0 <= held[LIFTED] <= 550.0
     assert held[OVER_BOX] == pytest.approx(held[LIFTED], rel=0.02)

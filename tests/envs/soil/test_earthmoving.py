@@ -16,7 +16,7 @@ FRICTION, STEEL = math.radians(39.0), math.radians(26.0)
 
 @pytest.mark.parametrize(("rake", "failure"), [row[:2] for row in FACTORS])
 def test_sand_fails_at_the_tabulated_angles(rake, failure):
-    """Experiment T6 holds the factors to the same table."""
+    """The experiment earthmoving_factors holds the factors to the same table."""
     assert math.degrees(failure_angle(math.radians(rake), FRICTION, STEEL)) == pytest.approx(failure, abs=0.1)
 
 

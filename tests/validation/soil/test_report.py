@@ -25,7 +25,7 @@ RESULT = Result(
 
 def experiment(**reasons):
     words = {"source": "Newton", "measures": "Soil falls", "gate": "as fast as it should"}
-    return SoilExperiment(code="T99", title="Falling soil", run=lambda _: RESULT, reasons=reasons, **words)
+    return SoilExperiment(name="falling", title="Falling soil", run=lambda _: RESULT, reasons=reasons, **words)
 
 
 def test_a_missed_gate_is_told_with_its_distance_and_its_reason():
@@ -41,7 +41,7 @@ def test_the_report_says_what_nobody_has_explained_and_names_the_simulation_and_
     assert "Not explained yet." in text
     assert re.search(r"version \d+ of the simulation", text)
     assert "(#t99-falling-soil)" in text
-    assert "## T99 Falling soil" in text
+    assert "## Falling soil" in text
 
 
 def test_the_report_is_written_with_its_plots_and_the_same_plot_is_the_same_file(tmp_path):
@@ -55,10 +55,10 @@ def test_the_report_is_written_with_its_plots_and_the_same_plot_is_the_same_file
     assert files[0].startswith(b"\x89PNG")
 
 
-def test_experiments_are_chosen_by_code_in_the_order_of_the_report():
-    assert [e.code for e in chosen("T12, T1")] == ["T1", "T12"]
+def test_experiments_are_chosen_by_name_in_the_order_of_the_report():
+    assert [e.name for e in chosen("ledger, heap")] == ["heap", "ledger"]
     assert chosen(None) == list(EXPERIMENTS)
-    assert len({e.code for e in EXPERIMENTS}) == len(EXPERIMENTS)
+    assert len({e.name for e in EXPERIMENTS}) == len(EXPERIMENTS)
 
 
 @pytest.mark.parametrize("seeds", [(), (-1,)])
@@ -70,7 +70,7 @@ def test_seeds_that_cannot_be_are_refused(seeds):
 def test_the_report_of_the_repository_has_every_experiment_and_picture():
     text = REPORT.read_text()
     for one in EXPERIMENTS:
-        assert f"## {one.code} {one.title}" in text
+        assert f"## {one.title}" in text
     for picture in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert (REPORT.parent / picture).is_file()
     assert "quick" not in text.split("##")[0]

@@ -37,11 +37,13 @@ SCOOP = TaskSpec(
     duration_s=20.0,  # kind: paper
     storage="image",
     settings=ExcavatorSettings,
-    simulation_version=2,
+    simulation_version=3,
     changes={
         1: "soil in the bucket as one volume, ballistic parcels; dig regions hidden from the main view were possible",
         2: "soil in the bucket as parcels in contact, hence other loads, forces and flows; every scene redrawn, with "
         "dig regions in view",
+        3: "avalanches with momentum, cuts that stand in cohesive soil, forces of load, heap and fresh ground, impact of "
+        "falling soil, another cab camera; every scene redrawn",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",
