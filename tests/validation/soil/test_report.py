@@ -40,7 +40,7 @@ def test_the_report_says_what_nobody_has_explained_and_names_the_simulation_and_
     text = report_text([(experiment(), RESULT)], Conditions())
     assert "Not explained yet." in text
     assert re.search(r"version \d+ of the simulation", text)
-    assert "(#t99-falling-soil)" in text
+    assert "(#falling-soil)" in text
     assert "## Falling soil" in text
 
 
