@@ -6,7 +6,17 @@ from lerobot_excav.errors import require_choice
 from validation.soil.experiment import SoilExperiment
 
 _FILES = (
-    *("column_collapse", "wall_collapse", "ridge", "standing_cut", "heap", "blade_force", "earthmoving_factors", "operator_cycle", "free_fall"),
+    *(
+        "column_collapse",
+        "wall_collapse",
+        "ridge",
+        "standing_cut",
+        "heap",
+        "blade_force",
+        "earthmoving_factors",
+        "operator_cycle",
+        "free_fall",
+    ),
     *("ledger", "determinism", "speed", "stall", "force_ramp"),
 )
 EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)

@@ -134,7 +134,14 @@ def run(conditions: Conditions) -> Result:
         ]
         if dt_s == TICK_S:
             profiles.append(heaps[0])
-    header = ("soil", "seed", "repose [°]", *(f"{math.degrees(a):.0f}°" for a in AZIMUTHS_RAD), "height [m]", "ideal cone [m]")
+    header = (
+        "soil",
+        "seed",
+        "repose [°]",
+        *(f"{math.degrees(a):.0f}°" for a in AZIMUTHS_RAD),
+        "height [m]",
+        "ideal cone [m]",
+    )
     return Result(
         checks=tuple(checks),
         tables=(Table(header, tuple(rows)),),

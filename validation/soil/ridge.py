@@ -46,8 +46,10 @@ def run(conditions: Conditions) -> Result:
             for change in (EXCESS_DEG, -SHORTFALL_DEG)
         )
         *_, field = flowing(steep, cell_m, sand.strength, _STEP_S, _LIMIT_S)
-        ways = np.linspace(0.25, 0.75, 30) * HEIGHT_M / sand.slope_tan
-        slopes = [flank_deg(field, azimuth_deg + turn, ways, offset) for turn in (0.0, 180.0) for offset in (-0.2, 0.17)]
+        ways = np.asarray(np.linspace(0.25, 0.75, 30) * HEIGHT_M / sand.slope_tan, dtype=np.float64)
+        slopes = [
+            flank_deg(field, azimuth_deg + turn, ways, offset) for turn in (0.0, 180.0) for offset in (-0.2, 0.17)
+        ]
         *_, still = flowing(flat, cell_m, sand.strength, _STEP_S, _LIMIT_S)
         moved_m = float(np.abs(still.heights - flat).max())
         label = f"{azimuth_deg}°, cells of {cell_m} m"

@@ -17,9 +17,12 @@ def across_m(cells: tuple[int, int], cell_m: float, azimuth_deg: float) -> Array
     return np.asarray(np.add.outer(x * math.cos(azimuth), y * math.sin(azimuth)))
 
 
-def flowing(heights_m: Array, cell_m: float, strength: Strength, step_s: float, limit_s: float) -> Iterator[HeightField]:
+def flowing(
+    heights_m: Array, cell_m: float, strength: Strength, step_s: float, limit_s: float
+) -> Iterator[HeightField]:
     """Let a field flow until it rests or a time has passed; yield it after every step."""
-    field = HeightField(heights_m.shape, (cell_m, cell_m), math.inf)
+    nx, ny = heights_m.shape
+    field = HeightField((nx, ny), (cell_m, cell_m), math.inf)
     field.reset(heights_m)
     for _ in range(round(limit_s / step_s)):
         before = field.heights.tobytes()

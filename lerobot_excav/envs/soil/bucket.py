@@ -9,7 +9,8 @@ from numpy.random import Generator
 from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.cutting import cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
-from lerobot_excav.envs.soil.height_field import HeightField, Window
+from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.layer import Window
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, poses_between
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.birth import Intake
@@ -128,11 +129,12 @@ class Bucket:
         self, geometry: ToolGeometry, path: Iterator[tuple[Pose, Pose]], field: HeightField, intake: Intake, room: float
     ) -> tuple[float, float]:
         entered, lost = 0.0, 0.0
-        columns = field.heights, field.layer.firm, self._parameters.swell
         for start, end in path:
             motion = geometry.planes_t, start, end, field.window(end.place(geometry.corners_t))
             intaking = self._fidelity.vertical_bins, max(0.0, room - entered), intake.bins
-            more, over = cut(*columns, field.active, field.grid, *motion, *intaking)
+            more, over = cut(
+                field.heights, field.layer.firm, self._parameters.swell, field.active, field.grid, *motion, *intaking
+            )
             entered += more
             lost += over
         return entered, lost

@@ -9,8 +9,8 @@ import math
 
 from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
-from lerobot_excav.envs.soil.layer import mark_around
+from lerobot_excav.envs.soil.height_field import Grid, in_grid
+from lerobot_excav.envs.soil.layer import Window, mark_around
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Bins, gather
 
@@ -203,7 +203,19 @@ def cut(
         for j in range(window.j0, window.j1):
             if heights[i, j] > 0.0:
                 more, over = cut_column(
-                    heights, firm, swell, active, grid, planes, pose_before, pose_now, i, j, samples, room - entered, intake
+                    heights,
+                    firm,
+                    swell,
+                    active,
+                    grid,
+                    planes,
+                    pose_before,
+                    pose_now,
+                    i,
+                    j,
+                    samples,
+                    room - entered,
+                    intake,
                 )
                 entered += more
                 lost += over
