@@ -46,7 +46,7 @@ def run(conditions: Conditions) -> Result:
             for change in (EXCESS_DEG, -SHORTFALL_DEG)
         )
         *_, field = flowing(steep, cell_m, sand.strength, _STEP_S, _LIMIT_S)
-        ways = np.linspace(0.25, 0.75, 30) * HEIGHT_M / sand.slope_tan
+        ways = np.asarray(np.linspace(0.25, 0.75, 30) * HEIGHT_M / sand.slope_tan, dtype=np.float64)
         slopes = [
             flank_deg(field, azimuth_deg + turn, ways, offset) for turn in (0.0, 180.0) for offset in (-0.2, 0.17)
         ]

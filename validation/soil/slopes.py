@@ -21,7 +21,8 @@ def flowing(
     heights_m: Array, cell_m: float, strength: Strength, step_s: float, limit_s: float
 ) -> Iterator[HeightField]:
     """Let a field flow until it rests or a time has passed; yield it after every step."""
-    field = HeightField(heights_m.shape, (cell_m, cell_m), math.inf)
+    nx, ny = heights_m.shape
+    field = HeightField((nx, ny), (cell_m, cell_m), math.inf)
     field.reset(heights_m)
     for _ in range(round(limit_s / step_s)):
         before = field.heights.tobytes()

@@ -68,8 +68,8 @@ def motion_m(case: Case, height_m: float) -> tuple[float, float]:
     "4 c/γ tan(45° + φ/2)",
     measures="Faces of different height, slope and azimuth in cohesive soil, on cells of three sizes; the greatest "
     "change of a column in 0.4 s.",
-    gate="vertical: stands at 0.93 and fails at 1.1 times the critical height; inclined: at 0.7 and 1.2 times; a cut of "
-    "0.2 m stands; mass kept to 1e-12",
+    gate="vertical: stands at 0.93 and fails at 1.1 times the critical height; inclined: at 0.7 and 1.2 times; a "
+    "cut of 0.2 m stands; mass kept to 1e-12",
 )
 def run(conditions: Conditions) -> Result:
     """Make cuts below and above the critical height."""

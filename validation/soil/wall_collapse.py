@@ -57,9 +57,10 @@ class Fall(NamedTuple):
 def let_go(case: Case) -> Fall:
     """Release a wall that fills half of a channel, and watch it."""
     count = 2 * round(2.5 * case.height_m / case.cell_m)
-    start = np.zeros((count, _WIDTH))
+    start: Array = np.zeros((count, _WIDTH))
     start[: count // 2] = case.height_m
-    every, last, seen, heights, k = round(WATCH_S / case.step_s), 0.0, start, start, 0
+    every, last, k = round(WATCH_S / case.step_s), 0.0, 0
+    seen = heights = start
     for k, field in enumerate(flowing(start, case.cell_m, PRESETS["sand"].strength, case.step_s, _LIMIT_S), 1):
         heights = field.heights
         if k % every == 0:
@@ -107,6 +108,9 @@ def run(conditions: Conditions) -> Result:
         *("height [m]", "cell [m]", "step [s]", "at rest after [s]", "last motion [s]", "at rest / √(h/g)"),
         *("reach / height", "steepest [°]"),
     )
-    curves = [Series(f"{c.height_m} m, {c.cell_m} m", *f.profile_m, "line") for c, f in zip(cases, falls, strict=True)]
+    curves = [
+        Series(f"{c.height_m} m, {c.cell_m} m", f.profile_m[0], f.profile_m[1], "line")
+        for c, f in zip(cases, falls, strict=True)
+    ]
     plot = Plot("wall_collapse", "Walls of sand at rest", "way from the wall / h", "height / h", tuple(curves))
     return Result(checks=tuple(checks), tables=(Table(header, tuple(rows)),), plots=(plot,))

@@ -2,8 +2,8 @@
 
 Static soil is never steeper than the repose slope s: |grad b| <= s. Where a column is too high for its lower
 neighbours, its upper part becomes mobile, down to the height that they support: the eikonal equation |grad b| = s,
-solved upwind on the eight triangles between a column, a neighbour along an axis and one on the diagonal. A planar slope
-is exact on them whatever its azimuth. Sweeps over the columns in alternating orders (fast sweeping, Zhao 2005; recalled)
+solved upwind on the eight triangles of a column, a neighbour along an axis and one on the diagonal. A planar slope is
+exact on them whatever its azimuth. Sweeps over the columns in alternating orders (fast sweeping, Zhao 2005; recalled)
 carry the failure across any number of columns, so that its speed does not depend on the size of a cell. Firm soil with
 cohesion holds; it fails in another way (`standing`).
 """

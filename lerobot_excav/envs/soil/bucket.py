@@ -9,7 +9,8 @@ from numpy.random import Generator
 from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.cutting import cut, set_ceiling
 from lerobot_excav.envs.soil.fidelity import Fidelity
-from lerobot_excav.envs.soil.height_field import HeightField, Window
+from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.layer import Window
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, poses_between
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.birth import Intake

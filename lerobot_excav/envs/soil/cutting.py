@@ -9,8 +9,8 @@ import math
 
 from lerobot_excav.envs.soil.arrays import Array, Flags, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.height_field import Grid, Window, in_grid
-from lerobot_excav.envs.soil.layer import mark_around
+from lerobot_excav.envs.soil.height_field import Grid, in_grid
+from lerobot_excav.envs.soil.layer import Window, mark_around
 from lerobot_excav.envs.soil.motion import Pose
 from lerobot_excav.envs.soil.parcels.birth import Bins, gather
 

@@ -63,8 +63,8 @@ class Layer(NamedTuple):
 
 
 CHANGED, FLOWING, SEEN = 1, 2, 3
-"""Why a column is active: it or a neighbour was changed from outside or failed; soil flows there or next to it; or one of
-the two, and its bed has been looked at since."""
+"""Why a column is active: it or a neighbour was changed from outside or failed; soil flows there or next to it; or one
+of the two, and its bed has been looked at since."""
 
 
 class Ground(NamedTuple):

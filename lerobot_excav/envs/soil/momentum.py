@@ -17,8 +17,8 @@ THINNEST_M = 5e-4
 """A mobile layer thinner than this lies still: a grain."""
 
 START_TAN = 8e-3
-"""Slope above the repose slope (tangent) at which soil at rest starts to move (tuned): 0.28 degrees at 39 degrees. Without
-a difference to the slope at which it stops, a slope at the limit would creep for ever."""
+"""Slope above the repose slope (tangent) at which soil at rest starts to move (tuned): 0.28 degrees at 39 degrees. Were
+it the slope at which it stops, a slope at the limit would creep for ever."""
 
 REST_M_S = 1e-2
 """Soil that is slower stops if its slope may rest, and starts with this speed (tuned: it moves 1 mm in 0.1 s)."""

@@ -31,10 +31,10 @@ class Strength(NamedTuple):
 class SoilParameters:
     """Bulk properties of one soil; `ORIGINS` has source and range of each."""
 
-    density_kg_m3: float  # bulk density, on the ground as in the air
+    density_kg_m3: float  # bulk density in the ground; loosened soil has this over `swell`
     friction_angle_rad: float  # internal friction; the repose angle is the same number, as in AGX Terrain
-    cohesion_pa: float  # cohesion, in the digging force and between parcels
-    swell: float  # volume of loosened soil in the bucket over its volume in the ground
+    cohesion_pa: float  # cohesion: in the digging force, between parcels, in cuts that stand
+    swell: float  # volume of loosened soil over its volume in the ground; it stays loose where it lands
     steel_friction_angle_rad: float  # friction between soil and plate
     parcel_solid_fraction: float = 0.56  # share of a bulk volume that the spheres of its parcels fill
     parcel_sliding_scale: float = 0.62  # sliding friction between parcels over the tangent of the friction angle

@@ -212,7 +212,7 @@ class Soil:
 
     @property
     def density_kg_m3(self) -> float:
-        """Bulk density, the same everywhere."""
+        """Bulk density in the ground; loosened soil has this over its swell."""
         return self.parameters.density_kg_m3
 
     @property

@@ -1,10 +1,11 @@
 """Cohesive soil: a cut stands until the weight of a wedge behind it overcomes the cohesion on the plane below it.
 
 A plane rises from the foot of a cut at an angle t into the soil. Above it lies a wedge of area A (per width). It slides
-if its weight pulls harder than friction and cohesion hold on the length B / cos t: A (tan t - tan phi) cos^2 t > c / gamma
-B (Culmann 1866; recalled). Behind a straight face this gives his critical height 4 c / gamma sin i cos phi /
-(1 - cos(i - phi)). Planes are tried in 16 directions from the foot, through the true surface; what lies on top of the
-soil weighs along. What is above the plane comes loose, and has no cohesion from then on.
+if its weight pulls harder than friction and cohesion hold on the length B / cos t:
+A (tan t - tan phi) cos^2 t > B c / gamma (Culmann 1866; recalled). Behind a straight face at the angle i this gives his
+critical height 4 c / gamma sin i cos phi / (1 - cos(i - phi)). Planes are tried in 16 directions from the foot, through
+the true surface; what lies on top of the soil weighs along. What is above the plane comes loose, and has no cohesion
+from then on.
 """
 
 import math
@@ -30,6 +31,12 @@ def _is_foot(heights: Array, ground: Ground, i: int, j: int) -> bool:
 
 
 @kernel
+def _on_ray(ground: Ground, i: int, j: int, way: float, cos: float, sin: float) -> tuple[int, int]:
+    """Return the column at a distance [m] from the middle of another one."""
+    return math.floor(i + way * cos / ground.dx + 0.5), math.floor(j + way * sin / ground.dy + 0.5)
+
+
+@kernel
 def weakest_plane(
     heights: Array, firm: Array, ground: Ground, i: int, j: int, cos: float, sin: float, top: float
 ) -> tuple[float, int]:
@@ -44,8 +51,7 @@ def weakest_plane(
     area, held = 0.0, 0.0
     for k in range(1, math.ceil((top - foot) / (ground.slope_tan * step)) + 2):
         way = (k - 0.5) * step  # from the edge of the foot to the middle of this column
-        p = int(math.floor(i + k * step * cos / ground.dx + 0.5))
-        q = int(math.floor(j + k * step * sin / ground.dy + 0.5))
+        p, q = _on_ray(ground, i, j, k * step, cos, sin)
         if p < 0 or q < 0 or p >= nx or q >= ny:
             break
         rise = heights[p, q] - foot
@@ -91,8 +97,7 @@ def fail_cuts(layer: Layer, ground: Ground, window: Window) -> None:
                 cos, sin = math.cos(angle), math.sin(angle)
                 slope, count = weakest_plane(heights, layer.firm, ground, i, j, cos, sin, top)
                 for k in range(1, count + 1):
-                    p = int(math.floor(i + k * step * cos / ground.dx + 0.5))
-                    q = int(math.floor(j + k * step * sin / ground.dy + 0.5))
+                    p, q = _on_ray(ground, i, j, k * step, cos, sin)
                     plane = heights[i, j] + (k - 0.5) * step * slope
                     if plane < bed[p, q] and heights[p, q] <= layer.ceiling[p, q]:
                         bed[p, q] = plane

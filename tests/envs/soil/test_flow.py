@@ -39,11 +39,10 @@ def random_layer(seed, border):
         for i, j in np.ndindex(SHAPE[0] + 1 - axis, SHAPE[1] + axis):
             before, after = (i - 1 + axis, j - axis), (i, j)
             speed = rng.normal(0.0, 0.7)
-            giver = before if speed > 0.0 else after
-            if 0 <= min(giver) and giver[0] < SHAPE[0] and giver[1] < SHAPE[1] and rng.random() < 0.7 and depth[giver]:
-                if min(before) >= 0 and after[0] < SHAPE[0] and after[1] < SHAPE[1]:
-                    layer.speeds[axis, i, j] = speed
-                    layer.flux[axis, i, j] = speed * depth[giver]
+            is_inside = min(before) >= 0 and after[0] < SHAPE[0] and after[1] < SHAPE[1]
+            if is_inside and rng.random() < 0.7 and depth[before if speed > 0.0 else after] > 0.0:
+                layer.speeds[axis, i, j] = speed
+                layer.flux[axis, i, j] = speed * depth[before if speed > 0.0 else after]
     return layer, ground
 
 

@@ -112,7 +112,7 @@ def _face(layer: Layer, ground: Ground, axis: int, i: int, j: int, dt: float) ->
 def _carried(layer: Layer, ground: Ground, axis: int, i: int, j: int, depth: float, dt: float) -> tuple[float, float]:
     speeds, flux = layer.speeds, layer.flux
     before, after = _columns(layer, axis, i, j)
-    sides = [column or other for column, other in ((before, after), (after, before)) if column or other]
+    sides = [side for pair in ((before, after), (after, before)) for side in [pair[0] or pair[1]] if side is not None]
     di, dj = 1 - axis, axis
     drift = float(np.mean([speeds[1 - axis, p + k * dj, q + k * di] for p, q in sides for k in (0, 1)]))
     steps = (ground.dx, ground.dy) if axis == 0 else (ground.dy, ground.dx)
