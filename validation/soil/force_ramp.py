@@ -51,9 +51,7 @@ def run(conditions: Conditions) -> Result:
     count = round((DEEPEST_M + HIGHEST_M) / spacing) + 1
     depths = np.asarray(np.linspace(-HIGHEST_M, DEEPEST_M, count), dtype=np.float64)
     soil = Soil(conditions.preset, (4.0, 4.0), 0.05, conditions.fidelity)
-    forces = {
-        rake: np.array([force_at_n(soil, float(d), rake) for d in depths]) for rake in track(RAKES_DEG, "rakes")
-    }
+    forces = {rake: np.array([force_at_n(soil, float(d), rake) for d in depths]) for rake in track(RAKES_DEG, "rakes")}
     above = max(float(f[depths <= 0.0].max()) for f in forces.values())
     steepest = max(float(np.abs(np.diff(f)).max()) / spacing / float(f[-1]) for f in forces.values())
     contact = max(force_at_n(soil, 1e-4, rake) / float(forces[rake][-1]) for rake in RAKES_DEG)

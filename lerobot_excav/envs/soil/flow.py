@@ -152,4 +152,4 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
         _discharge(layer, ground, window, step)
         over_border += _move(layer, ground, window, step)
         left -= step
-    return over_border, True
+    return over_border, active_window(layer.active, window).i1 > 0

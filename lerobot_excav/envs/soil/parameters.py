@@ -78,8 +78,12 @@ ORIGINS = {
     "swell": Origin("1", 1.0, 2.0, "paper", _AGX),
     "steel_friction_angle_rad": Origin("rad", 0.0, 1.2, "derived", "2/3 of the friction angle, McKyes 1985"),
     "parcel_solid_fraction": Origin("1", 0.3, 1.0, "tuned", "parcels poured gently into a bucket pack to 0.56"),
-    "parcel_sliding_scale": Origin("1", 0.0, 10.0, "guess", "0.5 for sand, usual in DEM; column_collapse hardly depends on it"),
-    "parcel_rolling_scale": Origin("1", 0.0, 10.0, "guess", "0.3 for sand, usual in DEM; column_collapse hardly depends on it"),
+    "parcel_sliding_scale": Origin(
+        "1", 0.0, 10.0, "guess", "0.5 for sand, usual in DEM; column_collapse hardly depends on it"
+    ),
+    "parcel_rolling_scale": Origin(
+        "1", 0.0, 10.0, "guess", "0.3 for sand, usual in DEM; column_collapse hardly depends on it"
+    ),
     "ground_sliding_scale": Origin("1", 0.0, 10.0, "tuned", "experiments column_collapse and heap"),
     "ground_rolling_scale": Origin("1", 0.0, 10.0, "tuned", "experiments column_collapse and heap"),
     "penetration_scale": Origin("1", 0.0, 100.0, "guess", "bearing theory as it is"),
