@@ -34,7 +34,7 @@ class OuterFaces:
     def of(cls, geometry: ToolGeometry, rows: int) -> "OuterFaces":
         """Cut the profile into pieces, from the edge to the lip, in so many lateral rows."""
         width = geometry.inner_width_m / rows
-        lateral: Array = (np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m
+        lateral = np.asarray((np.arange(rows) + 0.5) * width - 0.5 * geometry.inner_width_m, dtype=np.float64)
         pieces = [_edge_piece(geometry.profile_t)]
         for start, end in zip(geometry.profile_t[:-1], geometry.profile_t[1:], strict=True):
             pieces += _shell_pieces(start, end)

@@ -26,7 +26,7 @@ def least_force_n_m(
     `depth_at` gives the depth of the foot below the surface at some reach ahead [m]; soil above the face is level with
     the surface at no reach. Force balance of a rigid wedge: weight, load, push and reaction of the ground.
     """
-    reach: Array = np.arange(0.0, 4.0, 0.001)
+    reach = np.asarray(np.arange(0.0, 4.0, 0.001), dtype=np.float64)
     depths, least = depth_at(reach), math.inf
     for failure in np.radians(np.arange(0.0, 60.0, 0.2)):
         if rake + steel + friction + failure > math.radians(179.0):
