@@ -27,8 +27,8 @@ def _nearest(
 ) -> tuple[bool, float, int]:
     """Look through the first `count` of other parcels, by row.
 
-    Returns whether parcel k is nearer to one than `spacing` times the sum of radii, the square distance to the nearest with room for its mass,
-    and the row of that, -1 if none has room.
+    Returns whether parcel k is nearer to one than `spacing` times the sum of radii, the square distance to the nearest
+    with room for its mass, and the row of that, -1 if none has room.
     """
     crowded, best, partner = False, math.inf, -1
     for i in others[:count]:
