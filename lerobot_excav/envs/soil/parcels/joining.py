@@ -14,48 +14,56 @@ MOST_JOINED = 4.0
 """Largest mass of a parcel that others have joined, in whole ones: 1.6 times as wide. Were a few parcels to take up
 all that comes, each would touch all others, and a step would last for seconds (tuned)."""
 
-CROWDED = 1.0
-"""Distance between centres, in radii, below which two parcels cannot have been soil side by side (guess)."""
+CROWDED = 0.7
+"""Distance of two centres over the sum of radii, below which they cannot have been soil side by side (guess)."""
 
 CROWDED_REACH = 4.0
-"""Distance, in radii, within which a parcel that is born into another one may join a third."""
+"""Distance, in its radii, within which a parcel that is born into another one may join a third."""
 
 
 @kernel
 def _nearest(
-    positions: Array, masses: Array, others: Indices, count: int, k: int, most_kg: float
-) -> tuple[float, float, int]:
+    positions: Array, masses: Array, radii: Array, others: Indices, count: int, k: int, most_kg: float, spacing: float
+) -> tuple[bool, float, int]:
     """Look through the first `count` of other parcels, by row.
 
-    Returns the square distance from parcel k to the nearest one, that to the nearest with room for its mass, and the
-    row of the latter, -1 if none has room.
+    Returns whether parcel k is nearer to one than `spacing` times the sum of radii, the square distance to the nearest
+    with room for its mass, and the row of that, -1 if none has room.
     """
-    nearest, best, partner = math.inf, math.inf, -1
+    crowded, best, partner = False, math.inf, -1
     for i in others[:count]:
         far = 0.0
         for a in range(3):
             far += (positions[i, a] - positions[k, a]) ** 2
-        nearest = min(nearest, far)
+        crowded = crowded or far < (spacing * (radii[i] + radii[k])) ** 2
         if far < best and masses[i] + masses[k] <= most_kg:
             best, partner = far, i
-    return nearest, best, partner
+    return crowded, best, partner
 
 
 @kernel
 def join(
-    positions: Array, velocities: Array, masses: Array, asleep: Flags, free: int, most_kg: float, radius: float
+    positions: Array,
+    velocities: Array,
+    masses: Array,
+    radii: Array,
+    asleep: Flags,
+    free: int,
+    most_kg: float,
+    spacing: float,
 ) -> Flags:
     """Find a place for new parcels, one after the other.
 
     Args:
         positions: (n, 3) centres [m] of the parcels there are and of the new ones after them. Where a new one joins,
-            these three change in place, and mass, momentum and centre of mass are kept.
+            these four change in place, and mass, momentum, centre of mass and density are kept.
         velocities: (n, 3) the same [m/s].
         masses: (n,) the same [kg].
+        radii: (n,) the same [m].
         asleep: (old,) of the parcels there are; a sleeping one is left alone.
         free: How many of the new ones may stay parcels.
         most_kg: Largest mass to which parcels may grow.
-        radius: A new one nearer than `CROWDED` of these [m] to another one joins that or one near it; 0: it need not.
+        spacing: A new one nearer to another one than this share of the sum of radii joins that, or one near it.
 
     Returns:
         (n,) what becomes of each: it stays, it has joined the nearest one with room for its mass, or none has room.
@@ -68,12 +76,12 @@ def join(
             others[count] = i
             count += 1
     for k in range(old, len(masses)):
-        nearest, best, partner = _nearest(positions, masses, others, count, k, most_kg)
-        if free > 0 and nearest >= (CROWDED * radius) ** 2:
+        crowded, best, partner = _nearest(positions, masses, radii, others, count, k, most_kg, spacing)
+        if free > 0 and not crowded:
             free -= 1
             others[count] = k
             count += 1
-        elif partner < 0 or (free > 0 and best > (CROWDED_REACH * radius) ** 2):
+        elif partner < 0 or (free > 0 and best > (CROWDED_REACH * radii[k]) ** 2):
             fate[k] = WITHOUT_ROOM
         else:
             fate[k] = JOINED
@@ -81,5 +89,6 @@ def join(
             for a in range(3):
                 positions[partner, a] += share * (positions[k, a] - positions[partner, a])
                 velocities[partner, a] += share * (velocities[k, a] - velocities[partner, a])
+            radii[partner] *= (1.0 + masses[k] / masses[partner]) ** (1.0 / 3.0)
             masses[partner] += masses[k]
     return fate

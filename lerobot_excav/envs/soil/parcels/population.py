@@ -9,7 +9,7 @@ from lerobot_excav.envs.soil.arrays import Array, Bools, Flags, Indices
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
 from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
 from lerobot_excav.envs.soil.parcels.impact import Impact
-from lerobot_excav.envs.soil.parcels.joining import MOST_JOINED, STAYS, WITHOUT_ROOM, join
+from lerobot_excav.envs.soil.parcels.joining import CROWDED, MOST_JOINED, STAYS, WITHOUT_ROOM, join
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
 from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, bucket_reach
@@ -161,7 +161,8 @@ class Population:
         moving = np.concatenate([state.velocities, velocities])
         masses = np.concatenate([state.masses, masses_kg])
         most_kg = max(MOST_JOINED * self._mass_kg, float(masses_kg.max(initial=0.0)))
-        fate = join(points, moving, masses, state.asleep, free, most_kg, self._radius_m if apart else 0.0)
+        radii = self._radius_m * np.cbrt(masses / self._mass_kg)
+        fate = join(points, moving, masses, radii, state.asleep, free, most_kg, CROWDED if apart else 0.0)
         state.positions[:], state.velocities[:], state.masses[:] = points[:old], moving[:old], masses[:old]
         stay = old + np.flatnonzero(fate[old:] == STAYS)
         self._append(points[stay], moving[stay], masses[stay])
