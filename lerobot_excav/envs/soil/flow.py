@@ -1,10 +1,10 @@
 """Avalanches: soil that is steeper than its repose angle comes loose, gathers speed, runs out and rests.
 
-Every column has a mobile layer on a static bed. In a sub-step the bed fails where it is too steep (`bed`; firm soil with
-cohesion in `standing`), the layer gains and loses speed (`momentum`) and moves through the faces of its columns. A layer
-that stands still is bed again. The sub-steps follow from the fastest wave (Courant number 0.6), so times and run-outs
-are those of gravity and friction, whatever the cell, the step or the fidelity. What leaves one column enters another:
-the mass is exact to rounding. Firm soil that comes loose swells.
+Every column has a mobile layer on a static bed. In a sub-step the bed fails where it is too steep (`bed`; firm soil
+with cohesion in `standing`), the layer gains and loses speed (`momentum`) and moves through the faces of its columns. A
+layer that stands still is bed again. The sub-steps follow from the fastest wave (Courant number 0.6), so times and
+run-outs are those of gravity and friction, whatever the cell, the step or the fidelity. What leaves one column enters
+another: the mass is exact to rounding. Firm soil that comes loose swells.
 
 A rigid body over a column gives it a ceiling: soil below the ceiling takes no more than fits under it, and soil above
 it lies in or on that body and takes no part.

@@ -9,24 +9,23 @@ from hypothesis import strategies as st
 from bench.soil import BUCKET, tool_at
 from lerobot_excav.envs.constants import GRAVITY_M_S2, TICK_S
 from lerobot_excav.envs.soil import Soil
+from lerobot_excav.envs.soil.bearing import (
+    FALL_REACH_M,
+    SINKAGE_EXPONENT,
+    SINKAGE_MODULUS,
+    bearing_pressure,
+    blunt_pressure,
+    buried,
+    surroundings,
+    wedge_pressure,
+)
 from lerobot_excav.envs.soil.earthmoving import earthmoving_factors, failure_angle
 from lerobot_excav.envs.soil.forces import bearing_factors, soil_strength
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.patches import Patches, PatchKind
-from lerobot_excav.envs.soil.pressure import (
-    FALL_REACH_M,
-    SINKAGE_EXPONENT,
-    SINKAGE_MODULUS,
-    PlatePressure,
-    bearing_pressure,
-    blunt_pressure,
-    buried,
-    press_down,
-    renewal_lengths,
-    side_limits,
-    surroundings,
-    wedge_pressure,
-)
+from lerobot_excav.envs.soil.pressure import PlatePressure
+from lerobot_excav.envs.soil.side_plates import side_limits
+from lerobot_excav.envs.soil.sinkage import press_down, renewal_lengths
 from lerobot_excav.envs.soil.tool import Tool
 from validation.soil.reference.worlds import flat
 

@@ -42,8 +42,8 @@ SCOOP = TaskSpec(
         1: "soil in the bucket as one volume, ballistic parcels; dig regions hidden from the main view were possible",
         2: "soil in the bucket as parcels in contact, hence other loads, forces and flows; every scene redrawn, with "
         "dig regions in view",
-        3: "avalanches with momentum, cuts that stand in cohesive soil, forces of load, heap and fresh ground, impact of "
-        "falling soil, another cab camera; every scene redrawn",
+        3: "avalanches with momentum, cuts that stand in cohesive soil, forces of load, heap and fresh ground, impact "
+        "of falling soil, another cab camera; every scene redrawn",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",
