@@ -145,11 +145,12 @@ class Bucket:
         room: tuple[float, float],
     ) -> tuple[float, float]:
         (most, fade), entered, lost = room, 0.0, 0.0
-        columns = field.heights, field.layer.firm, self._parameters.swell
         for start, end in path:
             motion = geometry.planes_t, start, end, _window(geometry, end, field)
             intaking = self._fidelity.vertical_bins, max(0.0, most - entered), fade, intake.bins
-            more, over = cut(*columns, field.active, field.grid, *motion, *intaking)
+            more, over = cut(
+                field.heights, field.layer.firm, self._parameters.swell, field.active, field.grid, *motion, *intaking
+            )
             entered += more
             lost += over
         return entered, lost

@@ -106,7 +106,7 @@ def shell_limits(
 @kernel
 def level_breadth(start: Array, end: Array, normal: Array) -> float:
     """Return how long a piece between two points (3,) is as seen from below [m]; 0 if it does not look down."""
-    return math.sqrt(np.sum((end - start) ** 2)) * max(0.0, -normal[2])
+    return float(math.sqrt(np.sum((end - start) ** 2)) * max(0.0, -normal[2]))
 
 
 @kernel
