@@ -13,11 +13,12 @@ from lerobot_excav.errors import ExcavError, require
 
 _TIME_LIMIT_S = 60.0
 
-_EASE_TAN = 0.02
-"""How much flatter (tangent) soil is brought to rest than it would stay (tuned): 0.7 degrees at 39 degrees. At the very
-limit a long slope creeps for half a minute, a hundredth of a millimetre per tick."""
+_EASE_TAN = 2e-3
+"""How much flatter (tangent) soil is brought to rest after every later look that still found it moving (tuned): 0.07
+degrees at 39 degrees. At the very limit a long slope creeps for half a minute, a hundredth of a millimetre per tick."""
 
 _TICKS_PER_LOOK = 10
+_LOOKS_BEFORE = 15  # while an avalanche of some metres runs out, nothing is eased
 
 
 def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
@@ -37,12 +38,12 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
         cell_size_m > 0 and slope_tan > 0, f"cell_size_m={cell_size_m!r}, slope_tan={slope_tan!r}; allowed: above 0."
     )
     cell, slope = float(cell_size_m), float(slope_tan)
-    eased = Ground(max(slope - _EASE_TAN, 0.5 * slope), 0.0, 1.0, cell, cell, math.inf)
-    stays = eased._replace(slope_tan=slope)
+    stays = Ground(slope, 0.0, 1.0, cell, cell, math.inf)
     layer = _standing(heights)
-    for _ in range(round(_TIME_LIMIT_S / (_TICKS_PER_LOOK * TICK_S))):
+    for look in range(round(_TIME_LIMIT_S / (_TICKS_PER_LOOK * TICK_S))):
         if not flow(_standing(layer.heights), stays, TICK_S)[1]:
             return layer.heights
+        eased = stays._replace(slope_tan=max(slope - max(0, look - _LOOKS_BEFORE) * _EASE_TAN, 0.5 * slope))
         for _ in range(_TICKS_PER_LOOK):
             flow(layer, eased, TICK_S)
     raise ExcavError(f"no rest after {_TIME_LIMIT_S} s; use a coarser cell_size_m than {cell_size_m}.")

@@ -22,8 +22,9 @@ EXTENT_M = 3.0
 NEAREST_PLATE = 0.15
 """Smallest distance of a parcel's centre to a plate, as a share of its radius: steel never gets past the centre."""
 
-HOLDS_DEG = 1.5
-"""How much steeper than the repose angle a single column may stand at rest."""
+HOLDS_DEG = 3.0
+"""How much steeper than the repose angle a single column may stand at rest: over a pit on its diagonal, which the faces
+between columns see half of. Up to 2.8 degrees were found."""
 
 seeds = st.integers(0, 2**32 - 1)
 

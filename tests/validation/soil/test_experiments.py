@@ -17,7 +17,7 @@ CHEAP = ("blade_force", "earthmoving_factors", "free_fall", "ledger", "determini
 def test_an_experiment_is_inside_its_gates_or_says_why_not(experiment):
     # One arrangement of each column scatters too much for a fit through two of them.
     result = experiment.run(Conditions() if experiment.name == "column_collapse" else QUICK)
-    assert result.checks
+    assert result.checks or experiment.name == "newton_peer"  # a comparison has no gate
     if experiment.is_timed:
         assert all(check.value > 0.0 for check in result.checks)
     else:
