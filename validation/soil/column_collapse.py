@@ -38,8 +38,8 @@ Found = dict[float, list[list[Collapse]]]
     gate="exponent 1 ± 0.25 for a ≤ 1.5 and 0.5 ± 0.2 for a ≥ 2; prefactor 0.5 to 1.6 at 39° and 0.9 to 1.6 at 30°; "
     "a height field without inertia must be told apart",
     reasons={
-        "exponent, a ≤ 1.5, 30°": "A near miss. The lowest columns run out a little farther, in relation, than those of "
-        "aspect ratio 1.5, so the fit is flatter. Why has not been found out."
+        "exponent, a ≤ 1.5, 30°": "A near miss. The lowest columns run out a little farther, in relation, than those "
+        "of aspect ratio 1.5, so the fit is flatter. Why has not been found out."
     },
 )
 def run(conditions: Conditions) -> Result:
