@@ -23,7 +23,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-fr5 table-manipulation test test-lowest test-long fuzz lint type docs wheel clean
+.PHONY: help setup demo demo-fr5 table-manipulation test test-lowest test-long fuzz validate lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -82,6 +82,9 @@ $(NEWEST)/.ready: pyproject.toml $(READY)
 
 fuzz: $(READY) ## random commands to machine and soil, and random changes of every file and setting (hours)
 	@OMP_NUM_THREADS=1 $(RUN)/pytest tests/fuzz --hypothesis-profile=fuzz
+
+validate: $(READY) ## hold the soil to published experiments and to what nobody tuned; prints every gate (some 10 minutes)
+	@$(RUN)/python -m validation.soil
 
 lint: $(READY) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .

@@ -1,4 +1,4 @@
-"""One blade of experiment T17, which has them all."""
+"""One blade of the experiment moving_blade, which has them all."""
 
 import pytest
 

@@ -98,7 +98,7 @@ def test_the_load_weighs_on_the_cut_until_bucket_and_load_push_the_soil_as_one_b
     found = np.array([limits(flat(), EDGE, rake_deg=30.0, load=load)[0] for load in loads])
     steps = np.diff(found)
     assert (steps >= 0.0).all()
-    failure = math.radians(31.4)  # at a rake of 30 degrees; table of experiment T6
+    failure = math.radians(31.4)  # at a rake of 30 degrees; table of the experiment earthmoving_factors
     balance = math.sin(failure + SAND.friction) / math.sin(
         math.radians(30.0) + SAND.steel_friction + failure + SAND.friction
     )
