@@ -77,7 +77,7 @@ def surroundings(heights: Array, grid: Grid, x: float, y: float, forward: Level)
 
 @kernel
 def bearing_pressure(sinkage: float, depth: float, footing: float, fall: float, soil: SoilStrength) -> float:
-    """Return the pressure [Pa] of soil under a face that has sunk in; formulas at the head of this module.
+    """Return the pressure [Pa] of soil under a face that has sunk in; formulas at the head of `pressure`.
 
     The depth is that below the lowest ground around, the footing the breadth of bucket that bears, the fall that of
     the ground over `FALL_REACH_M` [m].

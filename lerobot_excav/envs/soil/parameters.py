@@ -27,6 +27,10 @@ class Strength(NamedTuple):
     swell: float  # volume of loosened soil over its volume in the ground
 
 
+MOST_FRICTION_RAD = 1.5
+"""Largest sum of both friction angles: 86 degrees, and at 90 no wedge before an upright plate can fail (derived)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SoilParameters:
     """Bulk properties of one soil; `ORIGINS` has source and range of each."""
@@ -41,7 +45,7 @@ class SoilParameters:
     parcel_rolling_scale: float = 0.37  # the same of rolling friction
     ground_sliding_scale: float = 1.7  # sliding friction of parcels on the ground over the same tangent
     ground_rolling_scale: float = 1.3  # the same of rolling friction
-    penetration_scale: float = 1.0  # factor on the bearing resistance of the cutting edge
+    penetration_scale: float = 1.0  # factor on the resistance of the blunt edge
 
     def __post_init__(self) -> None:
         for name, origin in ORIGINS.items():
@@ -51,6 +55,13 @@ class SoilParameters:
                 is_number and origin.low <= value <= origin.high,
                 f"soil {name}={shown(value)} is out of range; allowed: {origin.low} to {origin.high}.",
             )
+        both = self.friction_angle_rad + self.steel_friction_angle_rad
+        require(
+            both <= MOST_FRICTION_RAD,
+            f"soil friction_angle_rad={self.friction_angle_rad} and steel_friction_angle_rad="
+            f"{self.steel_friction_angle_rad} add up to {both:.3g}; allowed: up to {MOST_FRICTION_RAD}, for before an "
+            "upright plate a wedge of rougher soil would lock. Lower one of them.",
+        )
 
     @property
     def slope_tan(self) -> float:
@@ -86,7 +97,7 @@ ORIGINS = {
     ),
     "ground_sliding_scale": Origin("1", 0.0, 10.0, "tuned", "experiments column_collapse and heap"),
     "ground_rolling_scale": Origin("1", 0.0, 10.0, "tuned", "experiments column_collapse and heap"),
-    "penetration_scale": Origin("1", 0.0, 100.0, "guess", "bearing theory as it is"),
+    "penetration_scale": Origin("1", 0.0, 100.0, "guess", "theory as it is"),
 }
 """Source and range of each field of `SoilParameters`."""
 

@@ -101,7 +101,7 @@ def passive_force(
     which on level ground is the fundamental equation of earthmoving (`earthmoving`), with the load as its surcharge
     (as in Luengo, Singh and Cannon 1998). The plane is the one with the least force without cohesion.
     """
-    profile = np.empty(1 + int(_WEDGE_REACH_M / grid.dx))
+    profile = np.empty(max(2, 1 + int(_WEDGE_REACH_M / grid.dx)))
     known = read_profile(weighed, grid, foot, ahead, profile, 0, 2)
     if profile[0] <= 0.0:
         return 0.0, 0.0

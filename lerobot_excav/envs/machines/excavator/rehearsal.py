@@ -39,8 +39,11 @@ def rehearse() -> None:
 
 
 def _loose_soil(radius_m: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return places and velocities of parcels that lie on the ground, in the box and beside both; two collide."""
+    """Return places and velocities of parcels that lie on the ground, in the box and beside both.
+
+    Two collide, and of six in one place some join and one finds no room.
+    """
     above = _GROUND_M + radius_m
     places = [[2.0, 2.0, above], [2.0, 2.0, above + 1.5 * radius_m], [*TARGET_BOX.center_w[:2], radius_m]]
-    places += [[4.0, 0.0, radius_m]]
+    places += [[4.0, 0.0, radius_m], *[[1.0, 2.0, above]] * 6]
     return np.array(places), np.zeros((len(places), 3))
