@@ -269,6 +269,7 @@ RESUMABLE = {**WORK, "resume": flag}
 COMMAND_TABLES = {
     "demos": {**DEMOS, **RESUMABLE, "out": optional(path)},
     "operator": {**SCENES, **RESUMABLE, "metrics": optional(path)},
+    "warmup": {},
     "bench": {
         **{**SCENES, **WORK, "json": optional(path)},
         "only": optional(one_of("environment", "writing", "demos")),

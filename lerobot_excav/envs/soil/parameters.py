@@ -27,10 +27,6 @@ class Strength(NamedTuple):
     swell: float  # volume of loosened soil over its volume in the ground
 
 
-MOST_FRICTION_RAD = 1.5
-"""Largest sum of both friction angles: 86 degrees, and at 90 no wedge before an upright plate can fail (derived)."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class SoilParameters:
     """Bulk properties of one soil; `ORIGINS` has source and range of each."""
@@ -55,13 +51,6 @@ class SoilParameters:
                 is_number and origin.low <= value <= origin.high,
                 f"soil {name}={shown(value)} is out of range; allowed: {origin.low} to {origin.high}.",
             )
-        both = self.friction_angle_rad + self.steel_friction_angle_rad
-        require(
-            both <= MOST_FRICTION_RAD,
-            f"soil friction_angle_rad={self.friction_angle_rad} and steel_friction_angle_rad="
-            f"{self.steel_friction_angle_rad} add up to {both:.3g}; allowed: up to {MOST_FRICTION_RAD}, for before an "
-            "upright plate a wedge of rougher soil would lock. Lower one of them.",
-        )
 
     @property
     def slope_tan(self) -> float:

@@ -106,7 +106,7 @@ def passive_force(
     if profile[0] <= 0.0:
         return 0.0, 0.0
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
-    leaning = rake + soil.steel_friction + soil.friction
+    leaning = min(rake + soil.steel_friction + soil.friction, _STEEPEST_RAD)  # rougher soil would lock before a wall
     extra = 0.5 * profile[0] ** 2 / math.tan(rake) + load / soil.unit_weight
     least, sticking = math.inf, 0.0
     for j in range(-1, len(_TRIALS_RAD)):

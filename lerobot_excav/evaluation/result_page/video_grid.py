@@ -142,7 +142,7 @@ def _border_rgb(episode: EpisodeRecord) -> tuple[int, int, int]:
 
 
 def _rate(path: Path) -> Fraction:
-    with av.open(str(path)) as container:
+    with reading(path), av.open(str(path)) as container:
         return Fraction(container.streams.video[0].average_rate)
 
 

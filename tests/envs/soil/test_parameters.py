@@ -43,10 +43,3 @@ def test_presets_differ_from_each_other_and_can_be_keys():
 def test_a_value_out_of_range_is_named(name, value, allowed):
     with pytest.raises(ConfigurationError, match=f"{name}=.* is out of range; allowed: {allowed}"):
         dataclasses.replace(PRESETS["sand"], **{name: value})
-
-
-def test_soil_so_rough_that_no_wedge_could_fail_is_refused():
-    with pytest.raises(
-        ConfigurationError, match=r"friction_angle_rad=1\.0 and steel_friction_angle_rad=1\.0 .*allowed: up"
-    ):
-        dataclasses.replace(PRESETS["sand"], friction_angle_rad=1.0, steel_friction_angle_rad=1.0)

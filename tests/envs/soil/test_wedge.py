@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.soil.forces import soil_strength
+from lerobot_excav.envs.soil.forces import blade_force_n, soil_strength
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.soil.wedge import edge_limits, failure_angle_at, passive_force, read_profile, wedge_end
 from validation.soil.reference import wedge as reference
@@ -106,3 +107,8 @@ def test_the_load_weighs_on_the_cut_until_bucket_and_load_push_the_soil_as_one_b
     assert steps[-1] == 0.0
     assert steps.max() <= 1.01 * steps[0]
     assert limits(flat(), [[0.0, 0.0, 0.999]], rake_deg=30.0, load=5e3)[0] < 1.0
+
+
+def test_soil_so_rough_that_it_locks_before_an_upright_blade_holds_a_finite_force():
+    rough = dataclasses.replace(PRESETS["sand"], friction_angle_rad=1.2, steel_friction_angle_rad=1.2)
+    assert np.isfinite(blade_force_n(rough, 0.2, math.radians(90.0), 0.7)).all()
