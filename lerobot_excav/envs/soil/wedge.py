@@ -19,7 +19,7 @@ _WEDGE_REACH_M = 4.0
 
 _TRIALS_RAD = tuple(math.radians(angle) for angle in (24.0, 17.0, 11.0, 6.0, 2.5, 0.0, 32.0))
 """Rise of the trial planes. On level ground the tabulated angle is the best one and is tried before them; before a heap
-flat planes are, which differ most."""
+flat planes are, which differ most. The two planes halfway to the neighbours of the best one are tried last."""
 
 _STEEPEST_RAD = math.radians(179.0)
 """Largest sum of rake, wall friction, failure and friction angle; at 180 degrees a wedge locks."""
@@ -87,6 +87,19 @@ def wedge_end(profile: Array, known: int, step: float, slope: float, most: float
 
 
 @kernel
+def halfway_planes(best: float, tabulated: float) -> tuple[float, float]:
+    """Return the angles halfway from the best trial plane to the next flatter and the next steeper one."""
+    flatter, steeper = -math.inf, math.inf
+    for j in range(-1, len(_TRIALS_RAD)):
+        trial = tabulated if j < 0 else _TRIALS_RAD[j]
+        if trial < best:
+            flatter = max(flatter, trial)
+        elif trial > best:
+            steeper = min(steeper, trial)
+    return 0.5 * (best + max(flatter, 0.0)), 0.5 * (best + min(steeper, 2.0 * best))
+
+
+@kernel
 def passive_force(
     weighed: Array, grid: Grid, foot: Vector, ahead: Level, rake: float, load: float, soil: SoilStrength
 ) -> tuple[float, float]:
@@ -108,9 +121,18 @@ def passive_force(
     rake = min(max(rake, RAKE_MIN_RAD), RAKE_MAX_RAD)
     leaning = min(rake + soil.steel_friction + soil.friction, _STEEPEST_RAD)  # rougher soil would lock before a wall
     extra = 0.5 * profile[0] ** 2 / math.tan(rake) + load / soil.unit_weight
-    least, sticking = math.inf, 0.0
-    for j in range(-1, len(_TRIALS_RAD)):
-        failure = failure_angle_at(soil.table, rake) if j < 0 else _TRIALS_RAD[j]
+    least, sticking, count = math.inf, 0.0, len(_TRIALS_RAD)
+    tabulated = best = failure_angle_at(soil.table, rake)
+    flatter, steeper = 0.0, 0.0
+    for j in range(-1, count + 2):
+        if j == count:
+            flatter, steeper = halfway_planes(best, tabulated)
+        if j < 0:
+            failure = tabulated
+        elif j < count:
+            failure = _TRIALS_RAD[j]
+        else:
+            failure = flatter if j == count else steeper
         if leaning + failure > _STEEPEST_RAD:
             continue
         balance = soil.unit_weight * math.sin(failure + soil.friction) / math.sin(leaning + failure)
@@ -120,7 +142,7 @@ def passive_force(
             known = read_profile(weighed, grid, foot, ahead, profile, known, min(more + 7, len(profile)) if more else 0)
         force = balance * (area + extra)
         if force < least:
-            least = force
+            least, best = force, failure
             sticking = soil.cohesion * reach / math.cos(failure) * math.cos(soil.friction) / math.sin(leaning + failure)
     return least, sticking
 

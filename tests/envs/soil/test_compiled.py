@@ -3,8 +3,11 @@ import os
 import shutil
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lerobot_excav.envs.soil import compiled
@@ -141,8 +144,21 @@ def test_where_nothing_can_be_written_code_is_compiled_anyway_and_it_is_said_onc
 
 
 def test_kernels_let_other_threads_run():
-    @compiled.kernel
-    def half(value):
-        return 0.5 * value
+    """The kernel sees a flag that another thread raises while it runs; if it held the interpreter, none could."""
 
-    assert half.targetoptions["nogil"]
+    @compiled.kernel
+    def waits_for(flag, turns, most):
+        while turns[0] < most:  # counting in an array keeps the compiler from reading the flag only once
+            turns[0] += 1
+            if flag[0] > 0:
+                return True
+        return False
+
+    flag, turns = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    waits_for(flag, turns, 1)
+    with ThreadPoolExecutor(1) as pool:
+        seen = pool.submit(waits_for, flag, turns, 3 * 10**10)  # half a minute: long enough for the busiest machine
+        while turns[0] < 2:
+            time.sleep(0.001)
+        flag[0] = 1
+        assert seen.result()
