@@ -7,8 +7,8 @@ from validation.soil.experiment import SoilExperiment
 
 _FILES = (
     *("column_collapse", "wall_collapse", "ridge", "standing_cut", "heap", "blade_force", "earthmoving_factors"),
-    *("moving_blade", "bucket_drags", "digging_work", "operator_cycle", "free_fall", "ledger", "determinism"),
-    *("stall", "force_ramp", "speed", "newton_peer"),
+    *("moving_blade", "bucket_drags", "drag_rate", "filled_bucket", "digging_work", "operator_cycle", "free_fall"),
+    *("ledger", "determinism", "stall", "force_ramp", "speed", "newton_peer"),
 )
 EXPERIMENTS: tuple[SoilExperiment, ...] = tuple(import_module(f"validation.soil.{f}").run for f in _FILES)
 

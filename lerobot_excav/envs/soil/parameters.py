@@ -36,7 +36,7 @@ class SoilParameters:
     cohesion_pa: float  # cohesion: in the digging force, between parcels, in cuts that stand
     swell: float  # volume of loosened soil over its volume in the ground; it stays loose where it lands
     steel_friction_angle_rad: float  # friction between soil and plate
-    parcel_solid_fraction: float = 0.56  # share of a bulk volume that the spheres of its parcels fill
+    parcel_solid_fraction: float = 0.62  # share of a bulk volume that the spheres of its parcels fill
     parcel_sliding_scale: float = 0.62  # sliding friction between parcels over the tangent of the friction angle
     parcel_rolling_scale: float = 0.37  # the same of rolling friction
     ground_sliding_scale: float = 1.7  # sliding friction of parcels on the ground over the same tangent
@@ -77,7 +77,7 @@ ORIGINS = {
     "cohesion_pa": Origin("Pa", 0.0, 1e5, "paper", _AGX),
     "swell": Origin("1", 1.0, 2.0, "paper", _AGX),
     "steel_friction_angle_rad": Origin("rad", 0.0, 1.2, "derived", "2/3 of the friction angle, McKyes 1985"),
-    "parcel_solid_fraction": Origin("1", 0.3, 1.0, "tuned", "parcels poured gently into a bucket pack to 0.56"),
+    "parcel_solid_fraction": Origin("1", 0.3, 1.0, "tuned", "packing of sand that falls into a bucket: filled_bucket"),
     "parcel_sliding_scale": Origin(
         "1", 0.0, 10.0, "guess", "0.5 for sand, usual in DEM; column_collapse hardly depends on it"
     ),

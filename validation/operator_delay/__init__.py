@@ -1,0 +1,1 @@
+"""How the frame rate and a delay of the commands change what an operator achieves."""
