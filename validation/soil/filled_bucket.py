@@ -70,11 +70,6 @@ def poured_kg(seed: int, *, preset: str, fidelity: str, duration_s: float, fall_
     measures="900 kg are poured over the opening of a still, level bucket, slowly and quickly, from several heights, "
     "let go and thrown, for every soil; what stays is divided by what the bucket holds with a heap at repose.",
     gate=f"within {TOLERANCE:.0%} of the heap at repose",
-    reasons={
-        "wet_sand": "Cohesion between parcels (5 kPa, as in the ground) holds flanks steeper than repose. Handbooks, "
-        "too, give moist soil a fuller bucket than dry sand, but by some 10 %, not by 30.",
-        "dirt": "As wet sand, with less cohesion (2.1 kPa).",
-    },
 )
 def run(conditions: Conditions) -> Result:
     """Fill the bucket in a pairwise cover of the cases."""

@@ -36,9 +36,9 @@ def _laws(parameters: SoilParameters, fidelity: Fidelity, mass_kg: float) -> Law
     rolling = p.parcel_rolling_scale * tan
     ground = (p.ground_sliding_scale * tan, p.ground_rolling_scale * tan)
     return Laws(
-        parcel=Law(stiffness, p.parcel_sliding_scale * tan, rolling, p.cohesion_pa),
-        ground=Law(stiffness, *ground, p.cohesion_pa),
-        steel=Law(stiffness, math.tan(p.steel_friction_angle_rad), rolling, 0.0),
+        parcel=Law(stiffness, p.parcel_sliding_scale * tan, rolling),
+        ground=Law(stiffness, *ground),
+        steel=Law(stiffness, math.tan(p.steel_friction_angle_rad), rolling),
     )
 
 

@@ -33,7 +33,7 @@ class SoilParameters:
 
     density_kg_m3: float  # bulk density in the ground; loosened soil has this over `swell`
     friction_angle_rad: float  # internal friction; the repose angle is the same number, as in AGX Terrain
-    cohesion_pa: float  # cohesion: in the digging force, between parcels, in cuts that stand
+    cohesion_pa: float  # cohesion of firm soil: in the digging force, in cuts that stand
     swell: float  # volume of loosened soil over its volume in the ground; it stays loose where it lands
     steel_friction_angle_rad: float  # friction between soil and plate
     parcel_solid_fraction: float = 0.62  # share of a bulk volume that the spheres of its parcels fill

@@ -114,7 +114,7 @@ def test_a_parcel_on_the_rim_of_the_box_drops_after_a_while(offset):
 
 
 @pytest.mark.parametrize("mass_kg", [1e-6, 1e-4, 1e-2])
-def test_cohesion_draws_no_crumb_through_the_ground(mass_kg):
+def test_a_crumb_lands_and_does_not_sink_through_the_ground(mass_kg):
     soil = Soil("wet_sand")
     soil.reset(np.full((120, 120), 0.3))
     soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]), apart=False)

@@ -8,7 +8,6 @@ from lerobot_excav.envs.soil.arrays import Array
 from lerobot_excav.envs.soil.parcels.contact import (
     LARGEST_OVERLAP,
     LARGEST_PHASE,
-    MOST_COHESION,
     NORMAL_DAMPING,
     SEPARATION_M_S,
     TANGENTIAL_DAMPING,
@@ -57,9 +56,7 @@ def contact(
     damping = 2.0 * TANGENTIAL_DAMPING * math.sqrt(stiffness * mass)
     slide, springs[:3] = stretch(springs[:3], normal, velocity, stiffness, damping, law.sliding * pressing, dt)
     roll, springs[3:] = stretch(springs[3:], normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt)
-    largest_push = normal_stiffness * LARGEST_OVERLAP * radius
-    cohesion = min(law.cohesion * math.pi * radius**2, MOST_COHESION * largest_push)
-    return (pressing - cohesion) * normal + slide, roll
+    return pressing * normal + slide, roll
 
 
 def wall_contact(

@@ -26,7 +26,7 @@ MASS = 0.94
 DT = 0.001
 STIFFNESS = MASS * (0.2 / DT) ** 2
 PLATES = len(BUCKET.profile_t) + 1 + WALLS
-LAWS = Laws(Law(STIFFNESS, 0.5, 0.3, 0.0), Law(STIFFNESS, 0.97, 0.6, 0.0), Law(STIFFNESS, 0.49, 0.3, 0.0))
+LAWS = Laws(Law(STIFFNESS, 0.5, 0.3), Law(STIFFNESS, 0.97, 0.6), Law(STIFFNESS, 0.49, 0.3))
 
 
 def flat(height: float = 1.0, cells: int = 120) -> HeightField:

@@ -22,9 +22,6 @@ SEPARATION_M_S = 0.3
 LARGEST_OVERLAP = 0.5
 """Share of the radius above which the normal force grows no more (guess)."""
 
-MOST_COHESION = 0.5
-"""Largest pull of cohesion over the largest push of the normal spring (guess)."""
-
 TANGENTIAL_STIFFNESS = 0.4
 """Stiffness of the sliding and the rolling spring over that of the normal spring (usual choice, e.g. 2/7 to 1)."""
 
@@ -46,7 +43,6 @@ class Law(NamedTuple):
     stiffness: float  # of the normal spring [N/m]
     sliding: float  # coefficient of sliding friction
     rolling: float  # coefficient of rolling friction, at the radius of the parcel
-    cohesion: float  # pull of a closed contact per cross-section of the smaller partner [Pa]
 
 
 @kernel
@@ -151,10 +147,8 @@ def contact(
     damping = 2.0 * TANGENTIAL_DAMPING * _TANGENTIAL_IMPEDANCE * impedance
     slide = spring_force(springs, row, 0, normal, velocity, stiffness, damping, law.sliding * pressing, dt)
     roll = spring_force(springs, row, 3, normal, rolling_velocity, stiffness, damping, law.rolling * pressing, dt)
-    # A pull that no overlap can balance would draw light parcels through the ground.
-    most = MOST_COHESION * normal_stiffness * LARGEST_OVERLAP * radius
-    net = pressing - min(law.cohesion * math.pi * radius * radius, most)
-    return (net * normal[0] + slide[0], net * normal[1] + slide[1], net * normal[2] + slide[2]), roll
+    push = (pressing * normal[0] + slide[0], pressing * normal[1] + slide[1], pressing * normal[2] + slide[2])
+    return push, roll
 
 
 @kernel

@@ -38,12 +38,11 @@ def energy(state):
     return float(0.5 * (moving + spinning).sum() + GRAVITY_M_S2 * state.masses @ state.positions[:, 2])
 
 
-@given(seed=st.integers(0, 2**16), cohesion=st.sampled_from([0.0, 2100.0]), has_tool=st.booleans())
+@given(seed=st.integers(0, 2**16), has_tool=st.booleans())
 @settings(max_examples=25)
-def test_sub_steps_are_those_of_the_reference(seed, cohesion, has_tool):
+def test_sub_steps_are_those_of_the_reference(seed, has_tool):
     """A crowd in a moving bucket above a box and rough ground: all contacts at once, one parcel too fast."""
     rng, steps = np.random.default_rng(seed), 8
-    laws = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=cohesion))
     tool = tool_path((0.8, 0.0, 0.3), -2.6, [0.01, 0.0, 0.01], 0.02, steps)._replace(present=int(has_tool))
     ground = site(heights=rng.uniform(0.0, 0.3, (30, 30)), box=BOX, box_heights=rng.uniform(0, 0.1, (8, 6)))
     state = random_state(rng, 16, [0.5, 0.3, 0.2], centre=(0.3, 0.0, 0.25))
@@ -52,8 +51,8 @@ def test_sub_steps_are_those_of_the_reference(seed, cohesion, has_tool):
         state.asleep[:] = rng.random(16) < 0.25
         state.places_t[:] = (state.positions - tool.positions[0]) @ tool.rotations[0]
     twin = deepcopy(state)
-    hit = run(state, steps, ground, tool, laws)
-    assert hit == pytest.approx(reference.advance(twin, {}, tool, ground, laws, DT, steps, np.zeros(6)), abs=1e-9)
+    hit = run(state, steps, ground, tool)
+    assert hit == pytest.approx(reference.advance(twin, {}, tool, ground, LAWS, DT, steps, np.zeros(6)), abs=1e-9)
     assert_same(state, twin, "positions", "velocities", "spins", "ground_springs", "plate_springs", "ground", "shell")
     assert np.linalg.norm(state.velocities, axis=1).max() <= LARGEST_SPEED_M_S + 1e-9
 
@@ -88,7 +87,7 @@ def roll(angle, sliding, rolling, steps):
     normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
     start = foot + (RADIUS - MASS * GRAVITY_M_S2 * math.cos(angle) / STIFFNESS) * normal
     state = make_state([start])
-    run(state, steps, ground, laws=LAWS._replace(ground=Law(STIFFNESS, sliding, rolling, 0.0)))
+    run(state, steps, ground, laws=LAWS._replace(ground=Law(STIFFNESS, sliding, rolling)))
     return state, start
 
 
@@ -119,7 +118,7 @@ def test_rolling_friction_stops_a_rolling_parcel_after_the_way_of_its_energy(rol
     """7/10 m v^2 is used up by the force mu_r m g along the way."""
     start, speed = [-2.0, 0.0, RADIUS - MASS * GRAVITY_M_S2 / STIFFNESS], 1.0
     state = make_state([start], velocities=[[speed, 0.0, 0.0]], spins=[[0.0, speed / RADIUS, 0.0]])
-    run(state, 2000, laws=LAWS._replace(ground=Law(STIFFNESS, 1.0, rolling, 0.0)))
+    run(state, 2000, laws=LAWS._replace(ground=Law(STIFFNESS, 1.0, rolling)))
     assert np.linalg.norm(state.velocities[0]) < 1e-3
     assert state.positions[0, 0] + 2.0 == pytest.approx(0.7 * speed**2 / (rolling * GRAVITY_M_S2), rel=0.1)
 
@@ -139,40 +138,31 @@ def test_a_stack_stays_at_rest_and_its_energy_does_not_grow():
 
 
 def test_what_contacts_remember_outlives_new_lists_of_neighbours(rng):
-    """Two sticky lumps fly past each other: the list is made again and again, their contacts stay closed.
+    """A heap slides along a smooth gutter: the list is made again and again, contacts under weight stay closed.
 
     The twin has no list: it looks at all pairs and forgets only what opens.
     """
-    lump = 1.98 * RADIUS * np.array(list(np.ndindex(2, 2, 2))) + [0.0, 0.0, 2.0]
-    state = make_state(np.concatenate([lump, lump + np.array([0.3, 0.25, 0.0])]))
-    state.velocities[:8] = [4.0, 0.0, 0.0]
-    state.velocities[:] += rng.normal(0.0, 0.05, (16, 3))
-    state.spins[:] = rng.normal(0.0, 2.0, (16, 3))
-    sticky = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=2e4))
+    across = np.linspace(-2.95, 2.95, 60)
+    gutter = site(heights=np.repeat(np.abs(across)[None, :], 60, axis=0))
+    rows_x = 1.98 * RADIUS * np.arange(8) - 2.0
+    lower, upper = (np.column_stack([rows_x, np.zeros(8), np.full(8, z)]) for z in (1.42 * RADIUS, 3.38 * RADIUS))
+    state = make_state(np.concatenate([lower, upper]))
+    state.velocities[:] = np.array([4.0, 0.0, 0.0]) + rng.normal(0.0, 0.01, (16, 3))
+    state.spins[:] = rng.normal(0.0, 0.5, (16, 3))
+    smooth = LAWS._replace(ground=Law(STIFFNESS, 0.0, 0.0))
     twin, memory = deepcopy(state), {}
     anchor, made = state.positions.copy(), 0
     pairs, spare, rows = room_for(16), room_for(16), np.full(16, -1, dtype=np.int64)
     for _ in range(60):
-        pairs, spare, _ = advance(state, pairs, spare, rows, no_tool(5), site(), sticky, DT, 5, np.zeros(6))
+        pairs, spare, _ = advance(state, pairs, spare, rows, no_tool(5), gutter, smooth, DT, 5, np.zeros(6))
         rows = np.arange(16)
         made += not np.array_equal(pairs.anchors[:16], anchor)
         anchor = pairs.anchors[:16].copy()
-        reference.advance(twin, memory, no_tool(5), site(), sticky, DT, 5, np.zeros(6))
+        reference.advance(twin, memory, no_tool(5), gutter, smooth, DT, 5, np.zeros(6))
     assert made > 20
-    assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) >= 20
+    assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) >= 8
     np.testing.assert_allclose(state.positions, twin.positions, atol=1e-9)
     np.testing.assert_allclose(state.spins, twin.spins, rtol=1e-7, atol=1e-7)
-
-
-@pytest.mark.parametrize("cohesion", [1000.0, 1400.0, 1500.0, 2100.0])
-def test_cohesion_holds_a_hanging_parcel_up_to_its_limit(cohesion):
-    limit = cohesion * math.pi * RADIUS**2
-    overlap = max(0.0, limit - MASS * GRAVITY_M_S2) / STIFFNESS
-    state = make_state([[0.0, 0.0, 2.0], [0.0, 0.0, 2.0 - 2 * RADIUS + overlap + 1e-6]])
-    state.asleep[0] = 1  # it is held
-    run(state, 500, laws=LAWS._replace(parcel=LAWS.parcel._replace(cohesion=cohesion)))
-    hangs = abs(state.positions[1, 2] - (2.0 - 2 * RADIUS + overlap)) < 1e-4
-    assert hangs == (limit > MASS * GRAVITY_M_S2)
 
 
 def crosses(polygon, start, end):

@@ -56,15 +56,14 @@ def test_pair_forces_are_those_of_every_parcel_against_every_other(seed):
     state.load[:] = rng.random(12) < 0.5
     twin, memory = deepcopy(state), {}
     pairs, pushes, expected_pushes = first_list(state), np.zeros(6), np.zeros(6)
-    law = LAWS.parcel._replace(cohesion=float(rng.choice([0.0, 2100.0])))
     for _ in range(4):  # contacts open and close while the parcels are shaken
         shaken = rng.normal(0.0, 0.1 * SKIN * RADIUS, (12, 3))
         for s in (state, twin):
             s.positions[:] += np.clip(shaken, -0.12 * SKIN * RADIUS, 0.12 * SKIN * RADIUS)
             s.forces[:] = 0.0
             s.torques[:] = 0.0
-        hit = press_pairs(state, pairs, law, DT, pushes)
-        expected = reference.press_pairs(twin, memory, law, DT, expected_pushes)
+        hit = press_pairs(state, pairs, LAWS.parcel, DT, pushes)
+        expected = reference.press_pairs(twin, memory, LAWS.parcel, DT, expected_pushes)
         awake = state.asleep == 0
         np.testing.assert_allclose(state.forces[awake], twin.forces[awake], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(state.torques[awake], twin.torques[awake], rtol=1e-9, atol=1e-9)

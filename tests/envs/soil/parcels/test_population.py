@@ -93,20 +93,20 @@ def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch):
 
 
 def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
-    """Sticky lumps beyond the border: what touches the ground there leaves at once, new parcels join above."""
-    sticky = LAWS._replace(parcel=LAWS.parcel._replace(cohesion=1e4))
-    population, memory = make_population(laws=sticky), {}
-    lump = 1.97 * RADIUS * np.array(list(np.ndindex(2, 2, 2)))
-    place, rng = np.array([4.0, 0.0, 0.12]), np.random.default_rng(1)
-    left = joined = 0
+    """Heaps slide along a smooth gutter over the border: what touches the ground there leaves at once."""
+    smooth = LAWS._replace(ground=LAWS.ground._replace(sliding=0.0, rolling=0.0))
+    gutter = site(heights=np.repeat(np.abs(np.linspace(-2.95, 2.95, 60))[None, :], 60, axis=0))
+    population, memory = make_population(laws=smooth), {}
+    row, rng, speed = 1.98 * RADIUS * np.arange(8.0), np.random.default_rng(1), np.array([4.0, 0.0, 0.0])
+    heap = np.concatenate([np.column_stack([row, 0.0 * row, z + 0.0 * row]) for z in (1.42 * RADIUS, 3.38 * RADIUS)])
+    left = joined = remembered = 0
     for tick in range(16):
         if tick in (0, 4, 8):
-            start = lump + place + [0.0, 0.0, 0.05 * tick]
-            add(population, start, rng.normal(0.0, 0.05, (8, 3)))
+            add(population, heap + np.array([2.2, 0.0, 0.0]), speed + rng.normal(0.0, 0.01, (16, 3)))
             joined += tick > 0
         twin = deepcopy(population.state)
-        population.step(no_tool(STEPS), site(), TICK_S, cutting=False)
-        reference.advance(twin, memory, no_tool(STEPS), site(), sticky, TICK_S / STEPS, STEPS, np.zeros(6))
+        population.step(no_tool(STEPS), gutter, TICK_S, cutting=False)
+        reference.advance(twin, memory, no_tool(STEPS), gutter, smooth, TICK_S / STEPS, STEPS, np.zeros(6))
         np.testing.assert_allclose(population.state.positions, twin.positions, atol=1e-9)
         np.testing.assert_allclose(population.state.velocities, twin.velocities, atol=1e-7)
         gone = (population.state.ground == TOUCHES_OUTSIDE) & (population.state.load == 0)
@@ -114,9 +114,10 @@ def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
         rows = np.cumsum(~gone) - 1
         pairs = {(i, j): springs for (i, j), springs in memory.items() if not gone[i] and not gone[j]}
         memory = {(int(rows[i]), int(rows[j])): springs for (i, j), springs in pairs.items()}
+        remembered = max(remembered, sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()))
     assert left >= 8
     assert joined == 2
-    assert sum(np.abs(springs[:3]).max() > 1e-6 for springs in memory.values()) > 10
+    assert remembered >= 8
 
 
 WHILE = math.ceil(SETTLING_TIME_S / TICK_S - 1e-9)
