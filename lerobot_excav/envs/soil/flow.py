@@ -15,8 +15,8 @@ import math
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.bed import lower_bed
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.layer import FLOWING, Ground, Layer, Window, active_window, mark_around, wider
-from lerobot_excav.envs.soil.momentum import THINNEST_M, accelerate
+from lerobot_excav.envs.soil.layer import CHANGED, FLOWING, Ground, Layer, Window, active_window, mark_around, wider
+from lerobot_excav.envs.soil.momentum import CREEP_M_S, THINNEST_M, accelerate
 from lerobot_excav.envs.soil.standing import fail_cuts
 
 COURANT = 0.6
@@ -98,8 +98,8 @@ def _discharge(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
                         flux = min(flux, 0.25 * room / dt * (ground.dx if axis == 0 else ground.dy))
                     speed = math.copysign(flux / depth, speed)  # what is held back does not gather speed
                     layer.next_speeds[axis, i, j] = 0.0
-                elif layer.speeds[axis, i, j] != 0.0 and i < nx and j < ny:
-                    mark_around(layer.active, i, j)  # it has just stopped, perhaps on a slope that it came up
+                elif layer.speeds[axis, i, j] != 0.0:  # it has just stopped, perhaps on a slope that it came up
+                    mark_around(layer.active, min(i, nx - 1), min(j, ny - 1), FLOWING)
                 layer.speeds[axis, i, j] = speed
                 layer.flux[axis, i, j] = math.copysign(flux, speed)
 
@@ -120,12 +120,34 @@ def _move(layer: Layer, ground: Ground, window: Window, dt: float) -> float:
                 layer.bed[i, j] = layer.heights[i, j]
                 continue
             layer.heights[i, j] += (west - east) + (south - north)
-            for a in range(max(0, i - 1), min(nx, i + 2)):
-                for b in range(max(0, j - 1), min(ny, j + 2)):
-                    layer.active[a, b] = FLOWING
+            layer.creeping_s[i, j] += dt
+            mark_around(layer.active, i, j, FLOWING)
             over_border += (abs(west) if i == 0 else 0.0) + (abs(east) if i == nx - 1 else 0.0)
             over_border += (abs(south) if j == 0 else 0.0) + (abs(north) if j == ny - 1 else 0.0)
     return over_border
+
+
+@kernel
+def _note_creep(layer: Layer, window: Window) -> None:
+    """Forget how long soil has crept wherever the layer is fast, and around it."""
+    nx, ny = layer.heights.shape
+    for i in range(window.i0, window.i1 + 1):
+        for j in range(window.j0, window.j1 + 1):
+            for axis in range(2):
+                if abs(layer.speeds[axis, i, j]) > CREEP_M_S:
+                    for a in range(max(0, i - 2 + axis), min(nx, i + 2)):
+                        for b in range(max(0, j - 1 - axis), min(ny, j + 2)):
+                            layer.creeping_s[a, b] = 0.0
+
+
+@kernel
+def _forget_creep(layer: Layer) -> None:
+    """Forget how long soil has crept in columns that were changed."""
+    nx, ny = layer.heights.shape
+    for i in range(nx):
+        for j in range(ny):
+            if layer.active[i, j] == CHANGED:
+                layer.creeping_s[i, j] = 0.0
 
 
 @kernel
@@ -136,6 +158,7 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
     """
     nx, ny = layer.heights.shape
     window, over_border, left = Window(0, nx, 0, ny), 0.0, dt
+    _forget_creep(layer)
     if ground.cohesion_m > 0.0:
         fail_cuts(layer, ground, active_window(layer.active, window))
     while left > 1e-9 * dt:
@@ -151,5 +174,6 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
         _share_out(layer, ground, window, step)
         _discharge(layer, ground, window, step)
         over_border += _move(layer, ground, window, step)
+        _note_creep(layer, window)
         left -= step
     return over_border, active_window(layer.active, window).i1 > 0

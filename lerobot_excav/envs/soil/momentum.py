@@ -23,6 +23,12 @@ it the slope at which it stops, a slope at the limit would creep for ever."""
 REST_M_S = 1e-2
 """Soil that is slower stops if its slope may rest, and starts with this speed (tuned: it moves 1 mm in 0.1 s)."""
 
+CREEP_M_S = 3e-2
+"""Soil that is slower creeps (tuned: above the steady speed of a thin layer on a slope that hardly moves)."""
+
+PATIENCE_S = 1.0
+"""Soil that has crept for longer stops (tuned)."""
+
 GRAIN_M = 5e-4
 """Diameter of a grain (guess: medium sand)."""
 
@@ -128,6 +134,14 @@ def _rubbed(u: float, v: float, was: float, slope: Vector, slope_tan: float, dep
 
 
 @kernel
+def _is_tired(creeping_s: Array, p: int, q: int, i: int, j: int) -> bool:
+    """Tell whether soil has crept for too long on both sides of a face."""
+    nx, ny = creeping_s.shape
+    a, b, c, d = max(p, 0), max(q, 0), min(i, nx - 1), min(j, ny - 1)
+    return bool(creeping_s[a, b] > PATIENCE_S and creeping_s[c, d] > PATIENCE_S)
+
+
+@kernel
 def accelerate(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
     """Fill in `next_speeds` of the faces with a mobile layer around the columns of a window, after a time [s].
 
@@ -149,6 +163,8 @@ def accelerate(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
                 if depth <= THINNEST_M:
                     continue
                 if (is_there and heights[i, j] > ceiling[i, j]) or (is_before and heights[p, q] > ceiling[p, q]):
+                    continue
+                if abs(layer.speeds[axis, i, j]) < CREEP_M_S and _is_tired(layer.creeping_s, p, q, i, j):
                     continue
                 slope = _slope(heights, ground, axis, i, j)
                 own, drift = _carried(layer.speeds, layer.flux, ground, axis, i, j, 0.5 * (before + after), dt)
