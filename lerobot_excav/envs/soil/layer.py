@@ -42,7 +42,7 @@ class Layer(NamedTuple):
     bed_before: Array  # (nx, ny) work array: the bed at the start of a sub-step [m]
     support: Array  # (nx, ny) work array: the bed [m], infinite where soil cannot come down on it
     share: Array  # (nx, ny) work array: share of its outflow that a column has soil for
-    creeping_s: Array  # (nx, ny) time that soil has moved there and nowhere around it faster than `momentum.CREEP_M_S`
+    crept_s: Array  # (nx, ny) how long soil has moved there [s] since a change from outside or a fast flow (`momentum`)
 
     @classmethod
     def empty(cls, shape: tuple[int, int]) -> "Layer":
@@ -60,7 +60,7 @@ class Layer(NamedTuple):
             bed_before=np.zeros(shape),
             support=np.zeros(shape),
             share=np.zeros(shape),
-            creeping_s=np.zeros(shape),
+            crept_s=np.zeros(shape),
         )
 
 
@@ -82,7 +82,7 @@ class Ground(NamedTuple):
 
 @kernel
 def mark_around(active: Flags, i: int, j: int, why: int = CHANGED) -> None:
-    """Mark a column and its neighbours active."""
+    """Mark a column and its neighbours active, for a reason."""
     nx, ny = active.shape
     for a in range(max(0, i - 1), min(nx, i + 2)):
         for b in range(max(0, j - 1), min(ny, j + 2)):
