@@ -18,8 +18,8 @@ from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.layer import Ground, Layer, Window
 from lerobot_excav.envs.soil.slope import surface_slope
 
-THINNEST_M = 1e-3
-"""A mobile layer thinner than this lies still: two grains."""
+THINNEST_M = 5e-4
+"""A mobile layer thinner than this lies still: a grain."""
 
 START_TAN = 8e-3
 """Slope above the repose slope (tangent) at which soil at rest starts to move (tuned): 0.28 degrees at 39 degrees. Were

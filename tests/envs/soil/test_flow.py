@@ -34,6 +34,7 @@ def random_layer(seed, border):
     layer.heights[:] = layer.bed + depth
     layer.ceiling[:] = np.where(rng.random(SHAPE) < 0.2, layer.heights + rng.uniform(-0.05, 0.1, SHAPE), math.inf)
     layer.active[:] = 1
+    layer.crept_s[:] = rng.uniform(0.0, 4.0, SHAPE)
     ground = Ground(*SAND, CELL, WIDE, border)
     for axis in range(2):
         for i, j in np.ndindex(SHAPE[0] + 1 - axis, SHAPE[1] + axis):
@@ -61,6 +62,7 @@ def test_a_sub_step_moves_what_the_reference_moves(seed, border):
     layer, ground = random_layer(seed, border)
     layer.bed[:] = np.maximum(layer.bed, 10.0) - 10.0  # on a level floor nothing fails on the way
     layer.heights[:] = layer.bed + np.random.default_rng(seed).uniform(0.01, 0.2, SHAPE)
+    layer.crept_s[:] = 0.0  # as in all columns that were changed
     before = layer.heights.copy()
     dt = 1e-4  # shorter than any wave
     speeds = avalanche.next_speeds(layer, ground, dt)
