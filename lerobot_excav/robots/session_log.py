@@ -4,7 +4,7 @@
 nobody can read. The log holds what a deterministic simulation needs to repeat every episode, so that `lerobot-excav
 index` can complete a recording, or recover one from a crash. It is JSON Lines, one event a line:
 
-    {"event": "session", "simulation_version": 3, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...},
+    {"event": "session", "simulation_version": 4, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...},
      "task": "Dig where the mask points."}
     {"event": "episode", "episode_index": 3, "scene_id": 0, "target_id": 3}
     {"event": "action", "state": [...], "action": [...]}

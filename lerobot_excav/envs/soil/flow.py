@@ -15,8 +15,8 @@ import math
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.bed import lower_bed
 from lerobot_excav.envs.soil.compiled import kernel
-from lerobot_excav.envs.soil.layer import FLOWING, Ground, Layer, Window, active_window, mark_around, wider
-from lerobot_excav.envs.soil.momentum import THINNEST_M, accelerate
+from lerobot_excav.envs.soil.layer import CHANGED, FLOWING, Ground, Layer, Window, active_window, mark_around, wider
+from lerobot_excav.envs.soil.momentum import FAST_M_S, THINNEST_M, accelerate
 from lerobot_excav.envs.soil.standing import fail_cuts
 
 COURANT = 0.6
@@ -98,8 +98,10 @@ def _discharge(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
                         flux = min(flux, 0.25 * room / dt * (ground.dx if axis == 0 else ground.dy))
                     speed = math.copysign(flux / depth, speed)  # what is held back does not gather speed
                     layer.next_speeds[axis, i, j] = 0.0
-                elif layer.speeds[axis, i, j] != 0.0 and i < nx and j < ny:
-                    mark_around(layer.active, i, j)  # it has just stopped, perhaps on a slope that it came up
+                elif layer.speeds[axis, i, j] != 0.0:  # it has just stopped, perhaps on a slope that it came up
+                    mark_around(layer.active, min(i, nx - 1), min(j, ny - 1), FLOWING)
+                if abs(speed) > FAST_M_S:
+                    layer.crept_s[max(0, i - 2 + axis) : i + 2, max(0, j - 1 - axis) : j + 2] = 0.0
                 layer.speeds[axis, i, j] = speed
                 layer.flux[axis, i, j] = math.copysign(flux, speed)
 
@@ -108,7 +110,8 @@ def _discharge(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
 def _move(layer: Layer, ground: Ground, window: Window, dt: float) -> float:
     """Change the heights by the flux of a time [s]; return the height [m] that ran over the border.
 
-    Columns that moved are marked, and their neighbours; a layer that stands still becomes bed.
+    Columns that moved are marked, and their neighbours, and have crept for so long; a layer that stands still becomes
+    bed.
     """
     nx, ny = layer.heights.shape
     over_border = 0.0
@@ -120,12 +123,20 @@ def _move(layer: Layer, ground: Ground, window: Window, dt: float) -> float:
                 layer.bed[i, j] = layer.heights[i, j]
                 continue
             layer.heights[i, j] += (west - east) + (south - north)
-            for a in range(max(0, i - 1), min(nx, i + 2)):
-                for b in range(max(0, j - 1), min(ny, j + 2)):
-                    layer.active[a, b] = FLOWING
+            layer.crept_s[i, j] += dt
+            mark_around(layer.active, i, j, FLOWING)
             over_border += (abs(west) if i == 0 else 0.0) + (abs(east) if i == nx - 1 else 0.0)
             over_border += (abs(south) if j == 0 else 0.0) + (abs(north) if j == ny - 1 else 0.0)
     return over_border
+
+
+@kernel
+def _creep_anew(layer: Layer, window: Window) -> None:
+    """Forget how long soil has crept in the columns of a window that were changed."""
+    for i in range(window.i0, window.i1):
+        for j in range(window.j0, window.j1):
+            if layer.active[i, j] == CHANGED:
+                layer.crept_s[i, j] = 0.0
 
 
 @kernel
@@ -138,6 +149,7 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
     window, over_border, left = Window(0, nx, 0, ny), 0.0, dt
     if ground.cohesion_m > 0.0:
         fail_cuts(layer, ground, active_window(layer.active, window))
+    _creep_anew(layer, window)
     while left > 1e-9 * dt:
         failing = active_window(layer.active, window)
         if failing.i1 == 0:

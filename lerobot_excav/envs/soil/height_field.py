@@ -147,6 +147,7 @@ class HeightField:
         self.layer.firm[:] = new
         self.layer.speeds[:] = 0.0
         self.layer.flux[:] = 0.0
+        self.layer.crept_s[:] = 0.0
         self.active[:] = 1
         self.ceiling[:] = np.inf
         self._at_rest = False

@@ -42,6 +42,7 @@ class Layer(NamedTuple):
     bed_before: Array  # (nx, ny) work array: the bed at the start of a sub-step [m]
     support: Array  # (nx, ny) work array: the bed [m], infinite where soil cannot come down on it
     share: Array  # (nx, ny) work array: share of its outflow that a column has soil for
+    crept_s: Array  # (nx, ny) how long soil has moved there [s] since a change from outside or a fast flow (`momentum`)
 
     @classmethod
     def empty(cls, shape: tuple[int, int]) -> "Layer":
@@ -59,12 +60,13 @@ class Layer(NamedTuple):
             bed_before=np.zeros(shape),
             support=np.zeros(shape),
             share=np.zeros(shape),
+            crept_s=np.zeros(shape),
         )
 
 
 CHANGED, FLOWING, SEEN = 1, 2, 3
-"""Why a column is active: it or a neighbour was changed from outside or failed; soil flows there or next to it; or one
-of the two, and its bed has been looked at since."""
+"""Why a column is active: it or a neighbour was changed from outside or failed; soil flows there or next to it, or has
+just stopped; or one of the two, and its bed has been looked at since."""
 
 
 class Ground(NamedTuple):
@@ -79,12 +81,12 @@ class Ground(NamedTuple):
 
 
 @kernel
-def mark_around(active: Flags, i: int, j: int) -> None:
-    """Mark a column and its neighbours active."""
+def mark_around(active: Flags, i: int, j: int, why: int = CHANGED) -> None:
+    """Mark a column and its neighbours active, for a reason."""
     nx, ny = active.shape
     for a in range(max(0, i - 1), min(nx, i + 2)):
         for b in range(max(0, j - 1), min(ny, j + 2)):
-            active[a, b] = CHANGED
+            active[a, b] = why
 
 
 @kernel

@@ -4,6 +4,10 @@ Depth-averaged equations of a layer of depth m with a surface h (Savage and Hutt
 du/dt = -u . grad u - g grad h - mu g u / |u|. Friction acts against the whole velocity, not axis by axis, so that the
 repose angle is the same in all directions. Momentum is carried as in Stelling and Duinmeijer 2003 (recalled): with the
 flux through the faces, upwind, divided by the depth at the face.
+
+A thin layer on a slope at the limit would go on for minutes at a few centimetres per second: the law of friction has no
+lower bound of the speed, as real grains have. So soil that has only crept for a while stops, on a slope that is still a
+little too steep. How long it has crept starts anew where soil is changed from outside or a fast flow comes by.
 """
 
 import math
@@ -12,6 +16,7 @@ from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.arrays import Array, Level, Vector
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.layer import Ground, Layer, Window
+from lerobot_excav.envs.soil.slope import surface_slope
 
 THINNEST_M = 5e-4
 """A mobile layer thinner than this lies still: a grain."""
@@ -20,8 +25,24 @@ START_TAN = 8e-3
 """Slope above the repose slope (tangent) at which soil at rest starts to move (tuned): 0.28 degrees at 39 degrees. Were
 it the slope at which it stops, a slope at the limit would creep for ever."""
 
+HOLD_TAN = 2e-2
+"""The same of the steepest way down from a single column (tuned): 0.7 degrees at 39 degrees."""
+
 REST_M_S = 1e-2
 """Soil that is slower stops if its slope may rest, and starts with this speed (tuned: it moves 1 mm in 0.1 s)."""
+
+CREEP_M_S = 3e-2
+"""Slower soil creeps (tuned: what a thin layer comes to on a slope that is 0.3 degrees too steep). From a column that
+is too steep soil goes down at least as fast."""
+
+FAST_M_S = 0.1
+"""Faster soil is an avalanche, and lets the soil around it creep anew (tuned)."""
+
+PATIENCE_S = 1.0
+"""Soil that has crept for longer stops (tuned), unless it is too steep even for that (`STEEPER_PER_S`)."""
+
+STEEPER_PER_S = 0.05
+"""Slope above the repose slope (tangent), per second of creep, up to which soil that has crept stops (tuned)."""
 
 GRAIN_M = 5e-4
 """Diameter of a grain (guess: medium sand)."""
@@ -32,9 +53,6 @@ FRICTION_RISE = 0.2
 INERTIAL_NUMBER = 0.08
 """Inertial number of half of that rise (Chrono::FSI-SPH mu(I) Rheology Parameter Guide,
 https://api.projectchrono.org/manual_fsi_mu_i_rheology.html: mu_s 0.8, mu_2 1.0, mu_I0 0.08)."""
-
-_SAME_SIGN = 1e-9
-"""Product of two slopes from which on they point the same way; at a closed border one is zero but for rounding."""
 
 _LEAST_DEPTH_M = 0.02
 """Least depth in the inertial number (tuned): the law is for layers of many grains."""
@@ -49,35 +67,6 @@ def friction(slope_tan: float, speed: float, depth: float) -> float:
     m = max(depth, _LEAST_DEPTH_M)
     inertial = 2.5 * speed * GRAIN_M / (m * math.sqrt(GRAVITY_M_S2 * m))
     return slope_tan + FRICTION_RISE * inertial / (inertial + INERTIAL_NUMBER)
-
-
-@kernel
-def _height(heights: Array, i: int, j: int, border_height: float) -> float:
-    """Return the height [m] of a column; outside that of the border, or of the nearest column if it is closed."""
-    nx, ny = heights.shape
-    if 0 <= i < nx and 0 <= j < ny:
-        return float(heights[i, j])
-    if border_height < math.inf:
-        return border_height
-    return float(heights[min(max(i, 0), nx - 1), min(max(j, 0), ny - 1)])
-
-
-@kernel
-def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> Vector:
-    """Return the slope of the surface at a face, along its axis and across it, and the greatest slope there.
-
-    Across it is the mean of both sides of the face; on a crest or in a valley, where they differ in sign, the steeper
-    one: their mean would hide the slope. The greatest slope takes the steeper one everywhere.
-    """
-    di, dj, border = 1 - axis, axis, ground.border_height
-    step, side = (ground.dx, ground.dy) if axis == 0 else (ground.dy, ground.dx)
-    before, after = _height(heights, i - di, j - dj, border), _height(heights, i, j, border)
-    low = _height(heights, i - di - dj, j - dj - di, border) + _height(heights, i - dj, j - di, border)
-    high = _height(heights, i - di + dj, j - dj + di, border) + _height(heights, i + dj, j + di, border)
-    left, right = (before + after - low) / (2.0 * side), (high - before - after) / (2.0 * side)
-    down, steeper = (after - before) / step, left if abs(left) > abs(right) else right
-    aside = 0.5 * (left + right) if left * right > _SAME_SIGN else steeper
-    return down, aside, math.sqrt(down * down + steeper * steeper)
 
 
 @kernel
@@ -114,17 +103,25 @@ def _carried(speeds: Array, flux: Array, ground: Ground, axis: int, i: int, j: i
 def _rubbed(u: float, v: float, was: float, slope: Vector, slope_tan: float, depth: float, dt: float) -> float:
     """Return the part [m/s] of a driven velocity (u, v) along the axis that friction leaves after a time [s].
 
-    It moved at the speed `was` before. Soil at rest stays so where even the greatest slope may rest; slow soil stops
-    where the slope may rest.
+    It moved at the speed `was` before. Slow soil stops, and soil at rest stays so, where the slope may rest.
     """
-    driven = math.sqrt(u * u + v * v)
+    driven, excess = math.sqrt(u * u + v * v), math.sqrt(slope[0] ** 2 + slope[1] ** 2) - slope_tan
     left = driven - dt * GRAVITY_M_S2 * friction(slope_tan, was, depth)
-    if left < REST_M_S:
-        if was == 0.0:
-            return u * REST_M_S / driven if slope[2] > slope_tan + START_TAN else 0.0
-        if left <= 0.0 or math.sqrt(slope[0] ** 2 + slope[1] ** 2) <= slope_tan + START_TAN:
+    if driven > 0.0 and slope[2] > slope_tan + HOLD_TAN:
+        left = max(left, CREEP_M_S)
+    elif left < REST_M_S:
+        if excess <= START_TAN or (was > 0.0 and left <= 0.0):
             return 0.0
-    return u * left / driven
+        if was == 0.0:
+            left = REST_M_S
+    return u * left / driven if left > 0.0 else 0.0
+
+
+@kernel
+def _crept_s(layer: Layer, p: int, q: int, i: int, j: int) -> float:
+    """Return how long [s] soil has crept on both sides of a face; over the border that of the column inside counts."""
+    nx, ny = layer.crept_s.shape
+    return float(min(layer.crept_s[max(p, 0), max(q, 0)], layer.crept_s[min(i, nx - 1), min(j, ny - 1)]))
 
 
 @kernel
@@ -150,7 +147,11 @@ def accelerate(layer: Layer, ground: Ground, window: Window, dt: float) -> None:
                     continue
                 if (is_there and heights[i, j] > ceiling[i, j]) or (is_before and heights[p, q] > ceiling[p, q]):
                     continue
-                slope = _slope(heights, ground, axis, i, j)
+                slope = surface_slope(heights, ground, axis, i, j)
+                if abs(layer.speeds[axis, i, j]) < CREEP_M_S:
+                    crept_s = _crept_s(layer, p, q, i, j)
+                    if crept_s > PATIENCE_S and slope[2] < ground.slope_tan + STEEPER_PER_S * crept_s:
+                        continue
                 own, drift = _carried(layer.speeds, layer.flux, ground, axis, i, j, 0.5 * (before + after), dt)
                 was = math.sqrt(own * own + drift * drift)
                 u, v = own - dt * GRAVITY_M_S2 * slope[0], drift - dt * GRAVITY_M_S2 * slope[1]

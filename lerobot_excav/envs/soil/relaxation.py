@@ -13,12 +13,11 @@ from lerobot_excav.errors import ExcavError, require
 
 _TIME_LIMIT_S = 60.0
 
-_EASE_TAN = 2e-3
-"""How much flatter (tangent) soil is brought to rest after every later look that still found it moving (tuned): 0.07
-degrees at 39 degrees. At the very limit a long slope creeps for half a minute, a hundredth of a millimetre per tick."""
+_FLATTER_TAN = 1e-2
+"""How much flatter (tangent) than repose soil is brought to rest (tuned): 0.35 degrees at 39 degrees. What has only
+just stopped at the very limit would start again at a touch."""
 
-_TICKS_PER_LOOK = 10
-_LOOKS_BEFORE = 15  # while an avalanche of some metres runs out, nothing is eased
+_STEP_S = 0.1
 
 
 def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
@@ -39,13 +38,14 @@ def relax(heights_m: ArrayLike, cell_size_m: float, slope_tan: float) -> Array:
     )
     cell, slope = float(cell_size_m), float(slope_tan)
     stays = Ground(slope, 0.0, 1.0, cell, cell, math.inf)
-    layer = _standing(heights)
-    for look in range(round(_TIME_LIMIT_S / (_TICKS_PER_LOOK * TICK_S))):
+    layer, left_s = _standing(heights), _TIME_LIMIT_S
+    while left_s > 0.0:
         if not flow(_standing(layer.heights), stays, TICK_S)[1]:
             return layer.heights
-        eased = stays._replace(slope_tan=max(slope - max(0, look - _LOOKS_BEFORE) * _EASE_TAN, 0.5 * slope))
-        for _ in range(_TICKS_PER_LOOK):
-            flow(layer, eased, TICK_S)
+        layer, moves = _standing(layer.heights), True
+        while moves and left_s > 0.0:
+            _, moves = flow(layer, stays._replace(slope_tan=max(slope - _FLATTER_TAN, 0.5 * slope)), _STEP_S)
+            left_s -= _STEP_S
     raise ExcavError(f"no rest after {_TIME_LIMIT_S} s; use a coarser cell_size_m than {cell_size_m}.")
 
 

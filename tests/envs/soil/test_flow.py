@@ -34,6 +34,7 @@ def random_layer(seed, border):
     layer.heights[:] = layer.bed + depth
     layer.ceiling[:] = np.where(rng.random(SHAPE) < 0.2, layer.heights + rng.uniform(-0.05, 0.1, SHAPE), math.inf)
     layer.active[:] = 1
+    layer.crept_s[:] = rng.uniform(0.0, 4.0, SHAPE)
     ground = Ground(*SAND, CELL, WIDE, border)
     for axis in range(2):
         for i, j in np.ndindex(SHAPE[0] + 1 - axis, SHAPE[1] + axis):
@@ -61,6 +62,7 @@ def test_a_sub_step_moves_what_the_reference_moves(seed, border):
     layer, ground = random_layer(seed, border)
     layer.bed[:] = np.maximum(layer.bed, 10.0) - 10.0  # on a level floor nothing fails on the way
     layer.heights[:] = layer.bed + np.random.default_rng(seed).uniform(0.01, 0.2, SHAPE)
+    layer.crept_s[:] = 0.0  # as in all columns that were changed
     before = layer.heights.copy()
     dt = 1e-4  # shorter than any wave
     speeds = avalanche.next_speeds(layer, ground, dt)
@@ -129,6 +131,50 @@ def test_a_ridge_a_little_flatter_than_repose_does_not_move(azimuth_deg):
     start = ridge(azimuth_deg, 38.5)
     *_, (_, heights) = run(start, CELL, 0.2)
     np.testing.assert_array_equal(heights, start)
+
+
+def pile(seed):
+    """Four cones side by side, as steep as repose or up to 3 degrees steeper."""
+    rng = np.random.default_rng(seed)
+    x, heights = (np.arange(80) - 39.5) * CELL, np.zeros((80, 80))
+    for _ in range(4):
+        (cx, cy), top, slope_deg = rng.uniform(-0.6, 0.6, 2), rng.uniform(0.6, 1.0), rng.uniform(39.0, 42.0)
+        cone = top - math.tan(math.radians(slope_deg)) * np.hypot(x[:, None] - cx, x - cy)
+        heights = np.maximum(heights, cone)
+    return heights
+
+
+@pytest.mark.parametrize(
+    "start",
+    [ridge(22.5, 41.0), ridge(40.0, 41.0), ridge(22.5, 39.6), ridge(11.0, 41.0, 0.1), pile(0), pile(1), pile(2)],
+    ids=["22.5", "40", "39.6 degrees", "coarse", "pile 0", "pile 1", "pile 2"],
+)
+def test_a_slope_at_the_limit_comes_to_exact_rest_and_no_column_stands_much_too_steep(start):
+    cell = 4.0 / len(start)
+    field = HeightField(start.shape, (cell, cell), math.inf)
+    field.reset(start)
+    limit_s = 9.0 * math.sqrt(start.max() / 9.81) + 2.0
+    for _ in range(math.ceil(limit_s / 0.02)):
+        field.flow(0.02, SAND)
+    rested = field.heights.tobytes()
+    assert not field.active.any()
+    field.wake()
+    field.flow(0.02, SAND)
+    assert field.heights.tobytes() == rested
+    assert field.heights.sum() == pytest.approx(start.sum(), rel=1e-12)
+    assert math.degrees(math.atan(avalanche.steepest(field.heights, cell))) <= 39.0 + 3.0
+
+
+def test_a_stop_at_the_outer_faces_is_looked_at_like_one_at_the_others():
+    """Speeds die on all four sides of a field of level soil; a mound there would be seen if it were too steep."""
+    for axis, face in ((0, (0, 4)), (0, (9, 4)), (1, (4, 0)), (1, (4, 9))):
+        layer = Layer.empty((9, 9))
+        layer.heights[:], layer.bed[:] = 0.01, 0.0
+        layer.speeds[axis][face] = 1e-6
+        layer.active[:] = 1
+        flow(layer, Ground(*SAND, CELL, CELL, 0.01), 1e-4)
+        i, j = min(face[0], 8), min(face[1], 8)
+        assert layer.active[i, j], (axis, face)
 
 
 def wall(height, cell):

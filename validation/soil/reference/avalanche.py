@@ -6,7 +6,16 @@ import numpy as np
 
 from lerobot_excav.envs.constants import GRAVITY_M_S2
 from lerobot_excav.envs.soil.layer import Ground, Layer
-from lerobot_excav.envs.soil.momentum import REST_M_S, START_TAN, THINNEST_M, friction
+from lerobot_excav.envs.soil.momentum import (
+    CREEP_M_S,
+    HOLD_TAN,
+    PATIENCE_S,
+    REST_M_S,
+    START_TAN,
+    STEEPER_PER_S,
+    THINNEST_M,
+    friction,
+)
 from validation import Array
 
 _WAYS = np.linspace(0.0, 1.0, 4001)
@@ -79,7 +88,9 @@ def _slope(heights: Array, ground: Ground, axis: int, i: int, j: int) -> tuple[f
     left, right = (mean[j + 1] - mean[j]) / steps[1], (mean[j + 2] - mean[j + 1]) / steps[1]
     aside = 0.5 * (left + right) if left * right > 1e-9 else max(left, right, key=abs)
     down = float((after[j + 1] - before[j + 1]) / steps[0])
-    return down, float(aside), math.hypot(down, max(left, right, key=abs))
+    lower = min((before, after), key=lambda row: row[j + 1])
+    turned = max(0.0, float(lower[j + 1] - min(lower[j], lower[j + 2])) / steps[1])
+    return down, float(aside), math.hypot(down, min(turned, 4.0 * abs(down)))
 
 
 def _face(layer: Layer, ground: Ground, axis: int, i: int, j: int, dt: float) -> float:
@@ -93,15 +104,21 @@ def _face(layer: Layer, ground: Ground, axis: int, i: int, j: int, dt: float) ->
     depths = [_depth(layer, before), _depth(layer, after)]
     if max(depths) <= THINNEST_M:
         return 0.0
+    down, aside, greatest = _slope(layer.heights, ground, axis, i, j)
+    crept_s = min(float(layer.crept_s[column]) for column in there)
+    still_rests = greatest < ground.slope_tan + STEEPER_PER_S * crept_s
+    if abs(layer.speeds[axis, i, j]) < CREEP_M_S and crept_s > PATIENCE_S and still_rests:
+        return 0.0
     u, v = _carried(layer, ground, axis, i, j, sum(depths) / 2.0, dt)
     was = math.hypot(u, v)
-    down, aside, greatest = _slope(layer.heights, ground, axis, i, j)
     u, v = u - dt * GRAVITY_M_S2 * down, v - dt * GRAVITY_M_S2 * aside
     left = math.hypot(u, v) - dt * GRAVITY_M_S2 * friction(ground.slope_tan, was, max(depths))
-    if was == 0.0:
-        starts = greatest > ground.slope_tan + START_TAN
+    starts = math.hypot(down, aside) > ground.slope_tan + START_TAN
+    if greatest > ground.slope_tan + HOLD_TAN:
+        left = max(left, CREEP_M_S)
+    elif was == 0.0:
         left = max(left, REST_M_S) if starts or left >= REST_M_S else 0.0
-    elif left < REST_M_S and math.hypot(down, aside) <= ground.slope_tan + START_TAN:
+    elif left < REST_M_S and not starts:
         left = 0.0
     if left <= 0.0:
         return 0.0
