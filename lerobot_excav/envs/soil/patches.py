@@ -6,7 +6,7 @@ a motion is the admissible force that takes the most power from it (rate-indepen
 preferred direction of its own to jump to, can hold a tool at rest and never drives one.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -48,13 +48,15 @@ class Patches:
     @classmethod
     def none(cls) -> "Patches":
         """Return no resistance at all."""
-        return cls.alike(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), 0.0, PatchKind.WEDGE)
+        return _NONE
 
     @classmethod
     def alike(cls, points_w: Array, normals_w: Array, limits_n: Array, friction: float, kind: PatchKind) -> "Patches":
         """Return patches of one kind and one friction coefficient; those without a limit above zero are left out."""
         holds = limits_n > 0.0
-        count = int(holds.sum())
+        count = np.count_nonzero(holds)
+        if count == 0:
+            return _NONE
         return cls(
             points_w=points_w[holds],
             normals_w=normals_w[holds],
@@ -66,7 +68,16 @@ class Patches:
     @classmethod
     def joined(cls, *parts: "Patches") -> "Patches":
         """Return the patches of all parts."""
-        return cls(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])})
+        holding = [part for part in parts if len(part.limits_n)]
+        if len(holding) < 2:
+            return holding[0] if holding else _NONE
+        return cls(
+            points_w=np.concatenate([part.points_w for part in holding]),
+            normals_w=np.concatenate([part.normals_w for part in holding]),
+            limits_n=np.concatenate([part.limits_n for part in holding]),
+            frictions=np.concatenate([part.frictions for part in holding]),
+            kinds=np.concatenate([part.kinds for part in holding]),
+        )
 
     def __len__(self) -> int:
         """Return the number of patches."""
@@ -84,9 +95,19 @@ class Patches:
 
     def bounded(self, total_n: float, *kinds: PatchKind) -> "Patches":
         """Return the same patches, with the limits of some kinds scaled down to add up to a total [N] at most."""
-        chosen = np.isin(self.kinds, kinds)
-        share = total_n / max(float(self.limits_n[chosen].sum()), total_n)
-        return replace(self, limits_n=np.where(chosen, share * self.limits_n, self.limits_n))
+        chosen = np.zeros(len(self.kinds), dtype=np.bool_)
+        for kind in kinds:
+            chosen |= self.kinds == kind
+        sum_n = float(self.limits_n[chosen].sum())
+        if sum_n <= total_n:
+            return self
+        return Patches(
+            points_w=self.points_w,
+            normals_w=self.normals_w,
+            limits_n=np.where(chosen, total_n / sum_n * self.limits_n, self.limits_n),
+            frictions=self.frictions,
+            kinds=self.kinds,
+        )
 
     def wrench(self, origin_w: Array, linear_velocity_w: Array, angular_velocity_w: Array) -> tuple[Array, Array]:
         """Return force [N] and torque about the origin [N m] on a tool that moves on unhindered, both (3,).
@@ -96,6 +117,15 @@ class Patches:
         """
         motion = np.array(origin_w), np.array(linear_velocity_w), np.array(angular_velocity_w)
         return patch_wrench(self.points_w, self.normals_w, self.limits_n, self.frictions, *motion)
+
+
+_NONE = Patches(
+    points_w=np.zeros((0, 3)),
+    normals_w=np.zeros((0, 3)),
+    limits_n=np.zeros(0),
+    frictions=np.zeros(0),
+    kinds=np.zeros(0, dtype=np.int8),
+)
 
 
 @kernel

@@ -184,6 +184,9 @@ class PlatePressure:
 
     def __init__(self, geometry: ToolGeometry, rows: int, soil: SoilStrength) -> None:
         self._faces = OuterFaces.of(geometry, rows)
+        self._middles_t = 0.5 * (self._faces.starts_t + self._faces.ends_t)
+        self._areas_m2 = self._faces.areas_m2
+        self._is_shell = ~self._faces.is_edge
         self._outline_t = geometry.corners_t.reshape(2, -1, 3)
         self._soil = soil
         self._sinkages_m: Array = np.zeros(len(self._faces.starts_t))
@@ -197,17 +200,17 @@ class PlatePressure:
         floor_depth_m: float,
         ahead: Level,
         dt_s: float,
-    ) -> tuple[Patches, Patches, Patches]:
-        """Return what the ground holds against shell, edge and side plates; arguments as in `SoilResistance.react`.
+    ) -> tuple[Patches, ...]:
+        """Return what the ground holds against shell, edge, right and left side plate.
+
+        Arguments are as in `SoilResistance.react`.
 
         `ahead` is the level direction in which soil lies before the edge.
         """
         faces, rotation = self._faces, tool.rotation_w
         ground = heights_m, weighed_heights_m, grid
         raised = tool.position_w + np.array([0.0, 0.0, floor_depth_m])
-        arms = 0.5 * (faces.starts_t + faces.ends_t) @ rotation.T
         normals = faces.normals_t @ rotation.T
-        velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
         points, limits = shell_limits(
             *ground,
             raised + faces.starts_t @ rotation.T,
@@ -215,20 +218,21 @@ class PlatePressure:
             normals,
             faces.is_edge,
             faces.width_m,
-            faces.areas_m2,
+            self._areas_m2,
             faces.rows,
             (_forward(rotation), ahead),
-            velocities,
+            _velocities(tool, self._middles_t),
             dt_s,
             self._sinkages_m,
             self._soil,
         )
         points[:, 2] -= floor_depth_m
-        edge, shell, friction = faces.is_edge, ~faces.is_edge, math.tan(self._soil.steel_friction)
+        edge, shell, friction = faces.is_edge, self._is_shell, math.tan(self._soil.steel_friction)
         return (
             Patches.alike(points[shell], -normals[shell], limits[shell], friction, PatchKind.PRESSURE),
             Patches.alike(points[edge], -normals[edge], limits[edge], friction, PatchKind.PENETRATION),
-            Patches.joined(*(self._side(ground, rotation, raised, floor_depth_m, side) for side in (0, 1))),
+            self._side(ground, rotation, raised, floor_depth_m, 0),
+            self._side(ground, rotation, raised, floor_depth_m, 1),
         )
 
     def _side(
@@ -237,9 +241,19 @@ class PlatePressure:
         """Return what the ground holds against the right (0) or left (1) side plate."""
         normal = np.ascontiguousarray(rotation[:, 1]) * (2.0 * side - 1.0)
         points, limits = side_limits(*ground, raised + self._outline_t[side] @ rotation.T, normal, self._soil)
+        if not limits.any():
+            return Patches.none()
         points[:, 2] -= floor_depth_m
         normals = np.broadcast_to(-normal, points.shape)
         return Patches.alike(points, normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)
+
+
+def _velocities(tool: Tool, points_t: Array) -> Array:
+    """Return the velocities (n, 3) [m/s] of points of a tool."""
+    arms, (wx, wy, wz) = points_t @ tool.rotation_w.T, tool.angular_velocity_w.tolist()
+    x, y, z = arms.T
+    turning = np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
+    return np.asarray(tool.linear_velocity_w + turning)
 
 
 def _forward(rotation: Array) -> Level:
