@@ -6,6 +6,7 @@ a motion is the admissible force that takes the most power from it (rate-indepen
 preferred direction of its own to jump to, can hold a tool at rest and never drives one.
 """
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -135,16 +136,25 @@ def patch_wrench(
     """Add up the forces of patches on a moving tool; arguments and result as in `Patches.wrench`."""
     force, torque = np.zeros(3), np.zeros(3)
     for k in range(len(limits)):
-        arm = points[k] - origin
-        velocity = linear + np.cross(angular, arm)
-        speed = np.sqrt(np.sum(velocity * velocity) + REST_SPEED_M_S**2)
-        approach = -np.sum(velocity * normals[k])
+        n0, n1, n2 = normals[k, 0], normals[k, 1], normals[k, 2]
+        a0, a1, a2 = points[k, 0] - origin[0], points[k, 1] - origin[1], points[k, 2] - origin[2]
+        v0 = linear[0] + (angular[1] * a2 - angular[2] * a1)
+        v1 = linear[1] + (angular[2] * a0 - angular[0] * a2)
+        v2 = linear[2] + (angular[0] * a1 - angular[1] * a0)
+        speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + REST_SPEED_M_S**2)
+        approach = -(v0 * n0 + v1 * n1 + v2 * n2)
         if approach <= 0.0:
             continue
         push = limits[k] * min(1.0, approach / (FULL_SHARE * speed))
-        across = velocity + approach * normals[k]
-        sliding = np.sqrt(np.sum(across * across))
-        part = push * (normals[k] - frictions[k] * across / max(sliding, FULL_SHARE * speed))
-        force += part
-        torque += np.cross(arm, part)
+        c0, c1, c2 = v0 + approach * n0, v1 + approach * n1, v2 + approach * n2  # across the normal
+        most = max(math.sqrt(c0 * c0 + c1 * c1 + c2 * c2), FULL_SHARE * speed)
+        f0 = push * (n0 - frictions[k] * c0 / most)
+        f1 = push * (n1 - frictions[k] * c1 / most)
+        f2 = push * (n2 - frictions[k] * c2 / most)
+        force[0] += f0
+        force[1] += f1
+        force[2] += f2
+        torque[0] += a1 * f2 - a2 * f1
+        torque[1] += a2 * f0 - a0 * f2
+        torque[2] += a0 * f1 - a1 * f0
     return force, torque
