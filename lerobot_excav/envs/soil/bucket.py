@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.random import Generator
@@ -27,6 +28,7 @@ were it full at once, the heap ahead and the force would jump (guess)."""
 _NO_WINDOW = Window(0, 0, 0, 0)
 
 
+@lru_cache(maxsize=4)
 def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
     """Return the volume [m3] of a level bucket with a heap: struck volume and a hip roof over the opening.
 
