@@ -45,7 +45,7 @@ def buried(first: float, last: float) -> tuple[float, float, float]:
 
 
 @kernel
-def overlap(heights: Array, grid: Grid, x: float, y: float, z: float, normal: Array) -> float:
+def overlap(heights: Array, grid: Grid, x: float, y: float, z: float, normal: Vector) -> float:
     """Return how far the soil before a point of a face stands above it [m]; none beyond the field.
 
     It is read one cell outside of the face, in so far as the face is upright.
@@ -72,7 +72,8 @@ def surroundings(heights: Array, grid: Grid, x: float, y: float, forward: Level)
             x + FALL_REACH_M * (c * forward[0] - s * forward[1]),
             y + FALL_REACH_M * (c * forward[1] + s * forward[0]),
         )
-    return levels.min(), 0.5 * min(levels[0] + levels[1], levels[2] + levels[3])
+    lowest = min(min(levels[0], levels[1]), min(levels[2], levels[3]))
+    return lowest, 0.5 * min(levels[0] + levels[1], levels[2] + levels[3])
 
 
 @kernel
@@ -92,7 +93,7 @@ def bearing_pressure(sinkage: float, depth: float, footing: float, fall: float, 
 
 @kernel
 def wedge_pressure(
-    weighed: Array, grid: Grid, foot: Vector, top: float, normal: Array, depth: float, soil: SoilStrength
+    weighed: Array, grid: Grid, foot: Vector, top: float, normal: Vector, depth: float, soil: SoilStrength
 ) -> float:
     """Return the push per area [Pa] of soil before the part of a face between a foot and a top above it (z).
 
@@ -121,7 +122,7 @@ def normal_share(level: float, vertical: float, soil: SoilStrength) -> float:
 
 
 @kernel
-def blunt_pressure(depth: float, normal: Array, soil: SoilStrength) -> float:
+def blunt_pressure(depth: float, normal: Vector, soil: SoilStrength) -> float:
     """Return the push per area [Pa] of soil before the blunt edge (Balovnev, see `earthmoving.blunt_edge_factor`)."""
     sine = math.sin(soil.friction)
     entry = min(1.0, depth / PLATE_THICKNESS_M)

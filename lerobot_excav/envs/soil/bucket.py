@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.random import Generator
@@ -27,6 +28,7 @@ were it full at once, the heap ahead and the force would jump (guess)."""
 _NO_WINDOW = Window(0, 0, 0, 0)
 
 
+@lru_cache(maxsize=4)
 def heaped_volume_m3(geometry: ToolGeometry, slope_tan: float) -> float:
     """Return the volume [m3] of a level bucket with a heap: struck volume and a hip roof over the opening.
 
@@ -51,9 +53,7 @@ def _checked_motion(geometry: ToolGeometry, before: Pose | None, now: Pose) -> f
 
 def _window(geometry: ToolGeometry, pose: Pose, field: HeightField) -> Window:
     """Return the columns whose lines may be inside of the bucket: these stand up to half a cell from the middle."""
-    corners = pose.place(geometry.corners_t)
-    half_cell = 0.5 * np.array([*field.grid.cell_m, 0.0])
-    return field.window(np.stack([corners.min(axis=0) - half_cell, corners.max(axis=0) + half_cell]))
+    return field.window(pose.place(geometry.corners_t), (0.5 * field.grid.dx, 0.5 * field.grid.dy))
 
 
 class Bucket:
@@ -108,14 +108,14 @@ class Bucket:
             waiting_m3 = self.waiting_m3
             self.intake = Intake(geometry, self._fidelity.parcel_radius_m)
             self.intake.bins.volumes[0, 0] = waiting_m3
-        volumes_m3 = (0.0, 0.0)
+        volumes_m3, window = (0.0, 0.0), _window(geometry, pose, field)
         if before is not None:
             most = heaped_volume_m3(geometry, self._parameters.slope_tan) / self._parameters.swell
             room = max(0.0, (1.0 + 0.5 * FILLING_UP) * most - load_m3 - self.waiting_m3), FILLING_UP * most
             steps = max(1, math.ceil(motion_m / (self._fidelity.substep_cells * min(field.grid.cell_m))))
             path = poses_between(before, pose, steps)
-            volumes_m3 = self._sweep(geometry, path, field, self.intake, room)
-        self._cover(geometry, pose, field)
+            volumes_m3 = self._sweep(geometry, path, window, field, self.intake, room)
+        self._cover(geometry, pose, window, field)
         return volumes_m3
 
     def births(self, *, all_of_it: bool, rng: Generator) -> tuple[Array, Array]:
@@ -140,13 +140,15 @@ class Bucket:
         self,
         geometry: ToolGeometry,
         path: Iterator[tuple[Pose, Pose]],
+        last_window: Window,
         field: HeightField,
         intake: Intake,
         room: tuple[float, float],
     ) -> tuple[float, float]:
         (most, fade), entered, lost = room, 0.0, 0.0
         for start, end in path:
-            motion = geometry.planes_t, start, end, _window(geometry, end, field)
+            window = last_window if end is self.pose else _window(geometry, end, field)
+            motion = geometry.planes_t, start, end, window
             intaking = self._fidelity.vertical_bins, max(0.0, most - entered), fade, intake.bins
             more, over = cut(
                 field.heights, field.layer.firm, self._parameters.swell, field.active, field.grid, *motion, *intaking
@@ -155,9 +157,8 @@ class Bucket:
             lost += over
         return entered, lost
 
-    def _cover(self, geometry: ToolGeometry, pose: Pose, field: HeightField) -> None:
-        """Let the underside of the bucket hold avalanches back."""
-        window = _window(geometry, pose, field)
+    def _cover(self, geometry: ToolGeometry, pose: Pose, window: Window, field: HeightField) -> None:
+        """Let the underside of the bucket, which is inside of a window, hold avalanches back."""
         area = window.union(self._window)
         set_ceiling(field.heights, field.active, field.ceiling, field.grid, geometry.planes_t, pose, area)
         field.wake()

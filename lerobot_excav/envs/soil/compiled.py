@@ -59,8 +59,15 @@ _CACHE = _cache_directory()
 
 # Strict floating point (no reassociation) and one thread: a soil step is a pure function of its inputs. Other threads
 # of Python may run meanwhile. Without Python's own error model a division by zero gives infinity, as in NumPy, and
-# every other division the same bits with less code.
-_OPTIONS = {"fastmath": False, "parallel": False, "nogil": True, "error_model": "numpy"}
+# every other division the same bits with less code. No C function calls a kernel: without that entry there is a tenth
+# less to compile.
+_OPTIONS = {
+    "fastmath": False,
+    "parallel": False,
+    "nogil": True,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+}
 
 
 def kernel[F: Callable[..., Any]](function: F) -> F:

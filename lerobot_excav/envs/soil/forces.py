@@ -6,6 +6,7 @@ far plates have been pressed down, not on the direction of motion: that decides 
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,6 +65,27 @@ CLEAR_M = 0.1
 """A bucket whose inside stays this far above all soil touches none; its plates are thinner (PLATE_THICKNESS_M)."""
 
 
+class _Edge(NamedTuple):
+    """The cutting edge of a bucket in slices; all in the frame of the tool."""
+
+    along_t: Array  # (3,) unit vector from the edge along the bottom plate
+    opening_t: Array  # (3,) unit vector from the edge to the lip
+    inwards_t: Array  # (3,) unit normal of the bottom plate, into the bucket
+    middles_t: Array  # (n, 3) middles of the slices [m]
+
+    @classmethod
+    def of(cls, geometry: ToolGeometry, slices: int) -> "_Edge":
+        """Cut the edge of a bucket into so many slices."""
+        first = geometry.profile_t[0]
+        lateral = ((np.arange(slices) + 0.5) / slices - 0.5) * geometry.inner_width_m
+        return cls(
+            _way(first, geometry.profile_t[1]),
+            _way(first, geometry.profile_t[-1]),
+            -geometry.planes_t[1, :3],
+            np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1),
+        )
+
+
 class SoilResistance:
     """Reaction of the soil to a bucket.
 
@@ -80,6 +102,7 @@ class SoilResistance:
     def forget(self) -> None:
         """Take note that the tool is gone, or that the ground is new."""
         self._pressure: PlatePressure | None = None
+        self._edge: _Edge | None = None
         self._geometry: ToolGeometry | None = None
 
     def react(
@@ -104,10 +127,11 @@ class SoilResistance:
             self.forget()
             return Reaction.free(payload_mass_kg, payload_com_t)
         ground = heights_m, weighed_heights_m, grid, tool, floor_depth_m
-        ahead = _ahead(tool)
+        pressure, edge = self._parts(tool.geometry)
+        ahead = _ahead(tool.rotation_w, edge)
         patches = Patches.joined(
-            self._wedges(*ground, ahead, GRAVITY_M_S2 * payload_mass_kg),
-            *self._plates(tool.geometry).patches(*ground, ahead, dt_s),
+            self._wedges(*ground, edge, ahead, GRAVITY_M_S2 * payload_mass_kg),
+            *pressure.patches(*ground, ahead, dt_s),
         )
         force, torque = patches.wrench(tool.position_w, tool.linear_velocity_w, tool.angular_velocity_w)
         return Reaction(
@@ -118,11 +142,12 @@ class SoilResistance:
             patches=patches,
         )
 
-    def _plates(self, geometry: ToolGeometry) -> PlatePressure:
-        if self._pressure is None or self._geometry is None or not self._geometry.has_shape_of(geometry):
-            self._geometry = geometry
-            self._pressure = PlatePressure(geometry, max(2, self._slices // 2), self._soil)
-        return self._pressure
+    def _parts(self, geometry: ToolGeometry) -> tuple[PlatePressure, _Edge]:
+        if self._pressure and self._edge and self._geometry and self._geometry.has_shape_of(geometry):
+            return self._pressure, self._edge
+        self._geometry, self._edge = geometry, _Edge.of(geometry, self._slices)
+        self._pressure = PlatePressure(geometry, max(2, self._slices // 2), self._soil)
+        return self._pressure, self._edge
 
     def _wedges(
         self,
@@ -131,20 +156,17 @@ class SoilResistance:
         grid: Grid,
         tool: Tool,
         floor_depth_m: float,
+        edge: _Edge,
         ahead: Level,
         load_n: float,
     ) -> Patches:
         """Return the wedges before the slices of the edge, with a load of some weight in the bucket."""
-        geometry, rotation = tool.geometry, tool.rotation_w
-        first = geometry.profile_t[0]
-        along, opening = (_direction(rotation, first, geometry.profile_t[k]) for k in (1, -1))
-        across = rotation @ -geometry.planes_t[1, :3]
-        lateral = ((np.arange(self._slices) + 0.5) / self._slices - 0.5) * geometry.inner_width_m
-        edges_t = np.stack([np.full_like(lateral, first[0]), lateral, np.full_like(lateral, first[1])], axis=1)
-        edges = tool.position_w + edges_t @ rotation.T
+        rotation = tool.rotation_w
+        across = rotation @ edge.inwards_t
+        edges = tool.position_w + edge.middles_t @ rotation.T
         raised = edges + np.array([0.0, 0.0, floor_depth_m])
-        rakes = _rake(along, ahead), _rake(opening, ahead)
-        width = float(geometry.inner_width_m)
+        rakes = _rake(rotation @ edge.along_t, ahead), _rake(rotation @ edge.opening_t, ahead)
+        width = float(tool.geometry.inner_width_m)
         wedges = edge_limits(heights_m, weighed_heights_m, grid, raised, rakes, ahead, width, load_n, self._soil)
         steel = self._soil.steel_friction
         # The wedge stands at the angle of friction to the plate: its normal part here, the rest as friction.
@@ -153,10 +175,10 @@ class SoilResistance:
         return Patches.alike(edges, normals, pushes, math.tan(steel), PatchKind.WEDGE)
 
 
-def _direction(rotation: Array, start_t: Array, end_t: Array) -> Array:
-    """Return the unit vector (3,) in the world from one point (x, z) of the profile to another."""
+def _way(start_t: Array, end_t: Array) -> Array:
+    """Return the unit vector (3,) from one point (x, z) of the profile to another."""
     way = np.array([end_t[0] - start_t[0], 0.0, end_t[1] - start_t[1]])
-    return np.asarray(rotation @ (way / np.linalg.norm(way)))
+    return np.asarray(way / np.linalg.norm(way))
 
 
 def _rake(upwards: Array, ahead: Level) -> float:
@@ -164,11 +186,8 @@ def _rake(upwards: Array, ahead: Level) -> float:
     return math.atan2(upwards[2], -(upwards[0] * ahead[0] + upwards[1] * ahead[1]))
 
 
-def _ahead(tool: Tool) -> Level:
+def _ahead(rotation: Array, edge: _Edge) -> Level:
     """Return the level direction half-way between the line of the bottom plate and the outside of the opening."""
-    profile = tool.geometry.profile_t
-    level = -(_direction(tool.rotation_w, profile[0], profile[1]) + tool.rotation_w[:, 2])[:2]
-    length = float(np.hypot(*level))
-    if length < 1e-9:
-        return 1.0, 0.0
-    return float(level[0] / length), float(level[1] / length)
+    x, y, _ = (-(rotation @ edge.along_t + rotation[:, 2])).tolist()
+    length = float(np.hypot(x, y))
+    return (x / length, y / length) if length >= 1e-9 else (1.0, 0.0)

@@ -1,5 +1,6 @@
 """A height field over a rectangle: heights, deposits, samples and its own avalanches."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -176,13 +177,14 @@ class HeightField:
         self.active[:] = 1
         self._at_rest = False
 
-    def window(self, points: Array) -> Window:
-        """Return the columns under the bounding box of (n, 2 or 3) points."""
+    def window(self, points: Array, margin_m: tuple[float, float] = (0.0, 0.0)) -> Window:
+        """Return the columns under the bounding box of (n, 2 or 3) points, widened along x and y."""
         nx, ny = self.heights.shape
-        low, high = points.min(axis=0), points.max(axis=0)
         x0, y0, dx, dy = self.grid
-        i0, i1 = int(np.ceil((low[0] - x0) / dx)), int(np.floor((high[0] - x0) / dx)) + 1
-        j0, j1 = int(np.ceil((low[1] - y0) / dy)), int(np.floor((high[1] - y0) / dy)) + 1
+        # Numbers of Python: on so few points, each call of NumPy costs more than all of this.
+        xs, ys = points[:, :2].T.tolist()
+        i0, i1 = math.ceil((min(xs) - margin_m[0] - x0) / dx), math.floor((max(xs) + margin_m[0] - x0) / dx) + 1
+        j0, j1 = math.ceil((min(ys) - margin_m[1] - y0) / dy), math.floor((max(ys) + margin_m[1] - y0) / dy) + 1
         return Window(min(max(i0, 0), nx), min(max(i1, 0), nx), min(max(j0, 0), ny), min(max(j1, 0), ny))
 
     def solid_m3(self, swell: float) -> float:

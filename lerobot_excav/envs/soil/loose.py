@@ -5,10 +5,11 @@ import math
 import numpy as np
 
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.soil.arrays import Array
+from lerobot_excav.envs.soil.arrays import Array, Flags
+from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.container import Container
 from lerobot_excav.envs.soil.fidelity import Fidelity
-from lerobot_excav.envs.soil.height_field import HeightField
+from lerobot_excav.envs.soil.height_field import Grid, HeightField
 from lerobot_excav.envs.soil.motion import Pose, largest_motion, path
 from lerobot_excav.envs.soil.parameters import SoilParameters
 from lerobot_excav.envs.soil.parcels.contact import Law
@@ -40,6 +41,20 @@ def _laws(parameters: SoilParameters, fidelity: Fidelity, mass_kg: float) -> Law
         ground=Law(stiffness, *ground),
         steel=Law(stiffness, math.tan(p.steel_friction_angle_rad), rolling),
     )
+
+
+@kernel
+def _pile_up(heights: Array, grid: Grid, positions: Array, masses: Array, load: Flags, density: float) -> None:
+    """Add parcels (n,) outside of the bucket to the columns (nx, ny) [m] that they are over, as in the ground."""
+    nx, ny = heights.shape
+    half_x, half_y = 0.5 * nx * grid.dx, 0.5 * ny * grid.dy
+    for k in range(len(masses)):
+        x, y = positions[k, 0], positions[k, 1]
+        if load[k] or not (abs(x) < half_x and abs(y) < half_y):
+            continue
+        i = min(max(round((x - grid.x0) / grid.dx), 0), nx - 1)
+        j = min(max(round((y - grid.y0) / grid.dy), 0), ny - 1)
+        heights[i, j] += masses[k] / density / (grid.dx * grid.dy)
 
 
 def _box_walls(container: Container | None, floor_depth_m: float) -> BoxWalls:
@@ -118,13 +133,10 @@ class LooseSoil:
     def weighed_heights(self) -> Array:
         """Return (nx, ny) heights of the dig area [m] with the parcels outside of the bucket put on their columns."""
         state, field = self.population.state, self._field
-        rows = np.flatnonzero((state.load == 0) & field.contains(state.positions[:, :2]))
-        if len(rows) == 0:
+        if state.load.all():
             return field.heights
-        cells = (state.positions[rows, :2] - field.grid.first_m) / field.grid.cell_m
-        i, j = np.clip(np.rint(cells).astype(np.int64), 0, np.array(field.heights.shape) - 1).T
         heights = field.heights.copy()
-        np.add.at(heights, (i, j), state.masses[rows] / self._density_kg_m3 / field.cell_area_m2)
+        _pile_up(heights, field.grid, state.positions, state.masses, state.load, self._density_kg_m3)
         return heights
 
     def _steps(self, dt_s: float) -> int:

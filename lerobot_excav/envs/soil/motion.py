@@ -71,8 +71,11 @@ def _interpolate(position: Array, travel: Array, rotation: Array, turn: Array, s
     """Return positions (steps + 1, 3) and rotations (steps + 1, 3, 3) along a straight line with a constant turn."""
     positions, rotations = np.zeros((steps + 1, 3)), np.zeros((steps + 1, 3, 3))
     for k in range(steps + 1):
-        positions[k] = position + k / steps * travel
-        rotations[k] = turned(rotation, turn, k / steps)
+        rotated = turned(rotation, turn, k / steps)
+        for a in range(3):
+            positions[k, a] = position[a] + k / steps * travel[a]
+            for b in range(3):
+                rotations[k, a, b] = rotated[a, b]
     return positions, rotations
 
 

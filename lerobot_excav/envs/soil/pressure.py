@@ -67,23 +67,26 @@ def shell_limits(
     """
     count = len(starts)
     points, limits = np.zeros((count, 3)), np.zeros(count)
-    shares, contacts, depths, grounds, falls = np.zeros((5, count))
-    fronts, footing, mean = standing(heights, grid, starts, ends, normals, is_edge, ways[1]), 0.0, np.zeros(3)
+    shares, contacts, depths = np.zeros(count), np.zeros(count), np.zeros(count)
+    grounds, falls, mean = np.zeros(count), np.zeros(count), np.zeros(3)
+    fronts, footing = standing(heights, grid, starts, ends, normals, is_edge, ways[1]), 0.0
     for k in range(count):
-        a, b = starts[k], ends[k]
-        shares[k], depth, middle = fronts[k]
+        a, b, normal = row(starts, k), row(ends, k), row(normals, k)
+        share, depth, middle = row(fronts, k)
         if not is_edge[k]:
-            a, b = a + PLATE_THICKNESS_M * normals[k], b + PLATE_THICKNESS_M * normals[k]
-            shares[k], depth, middle = buried_between(heights, grid, a, b, normals[k])
-        points[k] = a + middle * (b - a)
-        mean += velocities[k] / count
-        if shares[k] > 0.0:
+            a, b = moved(a, PLATE_THICKNESS_M, normal), moved(b, PLATE_THICKNESS_M, normal)
+            share, depth, middle = buried_between(heights, grid, a, b, normal)
+        shares[k] = share
+        for i in range(3):
+            points[k, i] = a[i] + middle * (b[i] - a[i])
+            mean[i] += velocities[k, i] / count
+        if share > 0.0:
             contacts[k] = min(1.0, depth / PLATE_THICKNESS_M)
             lowest, grounds[k] = surroundings(heights, grid, points[k, 0], points[k, 1], ways[0])
             depths[k] = max(0.0, lowest - points[k, 2])
             falls[k] = surface_height(heights, grid, points[k, 0], points[k, 1]) - lowest
             if not is_edge[k]:
-                footing += contacts[k] * shares[k] * level_breadth(a, b, normals[k]) / rows
+                footing += contacts[k] * shares[k] * level_breadth(a, b, normal) / rows
     lengths = renewal_lengths(points, shares, is_edge, mean, width)
     press_down(sinkages, grounds, shares, points[:, 2], velocities, lengths, dt)
     for k in range(count):
@@ -94,9 +97,10 @@ def shell_limits(
             limits[k] *= bearing_pressure(sinkages[k], depths[k], breadth, falls[k], soil)
         if fronts[k, 0] > 0.0:
             if shares[k] <= 0.0:
-                points[k] = starts[k] + fronts[k, 2] * (ends[k] - starts[k])
+                for i in range(3):
+                    points[k, i] = starts[k, i] + fronts[k, 2] * (ends[k, i] - starts[k, i])
             if is_edge[k]:
-                push = blunt_pressure(fronts[k, 1], normals[k], soil)
+                push = blunt_pressure(fronts[k, 1], row(normals, k), soil)
             else:
                 push = front_pressure(weighed, grid, starts, ends, normals, fronts, rows, k, soil)
             limits[k] += area * fronts[k, 0] * push
@@ -104,14 +108,31 @@ def shell_limits(
 
 
 @kernel
-def level_breadth(start: Array, end: Array, normal: Array) -> float:
-    """Return how long a piece between two points (3,) is as seen from below [m]; 0 if it does not look down."""
-    return float(math.sqrt(np.sum((end - start) ** 2)) * max(0.0, -normal[2]))
+def row(array: Array, k: int) -> Vector:
+    """Return a row of an array (n, 3)."""
+    return array[k, 0], array[k, 1], array[k, 2]
 
 
 @kernel
-def buried_between(heights: Array, grid: Grid, start: Array, end: Array, normal: Array) -> Vector:
-    """Return what is buried of a piece between two points (3,) of an outer face: share, mean depth [m] and middle."""
+def moved(point: Vector, distance: float, direction: Vector) -> Vector:
+    """Return a point moved by a distance [m] along a unit vector."""
+    return (
+        point[0] + distance * direction[0],
+        point[1] + distance * direction[1],
+        point[2] + distance * direction[2],
+    )
+
+
+@kernel
+def level_breadth(start: Vector, end: Vector, normal: Vector) -> float:
+    """Return how long a piece between two points is as seen from below [m]; 0 if it does not look down."""
+    length = math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
+    return length * max(0.0, -normal[2])
+
+
+@kernel
+def buried_between(heights: Array, grid: Grid, start: Vector, end: Vector, normal: Vector) -> Vector:
+    """Return what is buried of a piece between two points of an outer face: share, mean depth [m] and middle."""
     first = overlap(heights, grid, start[0], start[1], start[2], normal)
     last = overlap(heights, grid, end[0], end[1], end[2], normal)
     return buried(first, last)
@@ -131,7 +152,7 @@ def front_pressure(
 ) -> float:
     """Return the pressure [Pa] of the wedge before the buried part of a piece; `fronts` are those of `standing`."""
     foot, top = foot_and_top(grid, starts, ends, normals, fronts, rows, k)
-    return float(wedge_pressure(weighed, grid, foot, top, normals[k], fronts[k, 1], soil))
+    return wedge_pressure(weighed, grid, foot, top, row(normals, k), fronts[k, 1], soil)
 
 
 @kernel
@@ -144,13 +165,25 @@ def standing(
     """
     fronts = np.zeros((len(starts), 3))
     for k in range(len(starts)):
-        a, b, normal = starts[k], ends[k], normals[k]
+        a, b, normal = row(starts, k), row(ends, k), row(normals, k)
+        front = (0.0, 0.0, 0.0)
         if is_edge[k]:
-            first = overlap(heights, grid, a[0], a[1], a[2], np.array([ahead[0], ahead[1], 0.0]))
-            fronts[k] = buried(first, first)
+            first = overlap(heights, grid, a[0], a[1], a[2], (ahead[0], ahead[1], 0.0))
+            front = buried(first, first)
         elif normal[0] ** 2 + normal[1] ** 2 > _NO_SLOPE**2:
-            fronts[k] = buried_between(heights, grid, a, b, normal)
+            front = buried_between(heights, grid, a, b, normal)
+        fronts[k, 0], fronts[k, 1], fronts[k, 2] = front
     return fronts
+
+
+@kernel
+def between(starts: Array, ends: Array, k: int, share: float) -> Vector:
+    """Return the point of a piece at a share of the way from its start (k, 3) to its end [m]."""
+    return (
+        starts[k, 0] + share * (ends[k, 0] - starts[k, 0]),
+        starts[k, 1] + share * (ends[k, 1] - starts[k, 1]),
+        starts[k, 2] + share * (ends[k, 2] - starts[k, 2]),
+    )
 
 
 @kernel
@@ -164,15 +197,15 @@ def foot_and_top(
     """
     level = math.sqrt(normals[k, 0] ** 2 + normals[k, 1] ** 2)
     x, y = normals[k, 0] / level, normals[k, 1] / level
-    one = starts[k] + (fronts[k, 2] - 0.5 * fronts[k, 0]) * (ends[k] - starts[k])
-    other = starts[k] + (fronts[k, 2] + 0.5 * fronts[k, 0]) * (ends[k] - starts[k])
+    one = between(starts, ends, k, fronts[k, 2] - 0.5 * fronts[k, 0])
+    other = between(starts, ends, k, fronts[k, 2] + 0.5 * fronts[k, 0])
     foot = one if one[2] < other[2] else other
     farthest = 0.0
     if normals[k, 2] < 0.0:
         for j in range(k % rows, len(starts), rows):
             if fronts[j, 0] > 0.0 and x * normals[j, 0] + y * normals[j, 1] > 0.0:
-                for share in (fronts[j, 2] - 0.5 * fronts[j, 0], fronts[j, 2] + 0.5 * fronts[j, 0]):
-                    point = starts[j] + share * (ends[j] - starts[j])
+                for end in range(2):
+                    point = between(starts, ends, j, fronts[j, 2] + (end - 0.5) * fronts[j, 0])
                     farthest = max(farthest, x * (point[0] - foot[0]) + y * (point[1] - foot[1]))
     # The surface is read one cell ahead of the foot, but next to an inclined face in so far as that is upright.
     farthest -= (1.0 - level) * grid.dx
@@ -184,6 +217,9 @@ class PlatePressure:
 
     def __init__(self, geometry: ToolGeometry, rows: int, soil: SoilStrength) -> None:
         self._faces = OuterFaces.of(geometry, rows)
+        self._middles_t = 0.5 * (self._faces.starts_t + self._faces.ends_t)
+        self._areas_m2 = self._faces.areas_m2
+        self._is_shell = ~self._faces.is_edge
         self._outline_t = geometry.corners_t.reshape(2, -1, 3)
         self._soil = soil
         self._sinkages_m: Array = np.zeros(len(self._faces.starts_t))
@@ -197,17 +233,17 @@ class PlatePressure:
         floor_depth_m: float,
         ahead: Level,
         dt_s: float,
-    ) -> tuple[Patches, Patches, Patches]:
-        """Return what the ground holds against shell, edge and side plates; arguments as in `SoilResistance.react`.
+    ) -> tuple[Patches, ...]:
+        """Return what the ground holds against shell, edge, right and left side plate.
+
+        Arguments are as in `SoilResistance.react`.
 
         `ahead` is the level direction in which soil lies before the edge.
         """
         faces, rotation = self._faces, tool.rotation_w
         ground = heights_m, weighed_heights_m, grid
         raised = tool.position_w + np.array([0.0, 0.0, floor_depth_m])
-        arms = 0.5 * (faces.starts_t + faces.ends_t) @ rotation.T
         normals = faces.normals_t @ rotation.T
-        velocities = tool.linear_velocity_w + np.cross(tool.angular_velocity_w, arms)
         points, limits = shell_limits(
             *ground,
             raised + faces.starts_t @ rotation.T,
@@ -215,20 +251,21 @@ class PlatePressure:
             normals,
             faces.is_edge,
             faces.width_m,
-            faces.areas_m2,
+            self._areas_m2,
             faces.rows,
             (_forward(rotation), ahead),
-            velocities,
+            _velocities(tool, self._middles_t),
             dt_s,
             self._sinkages_m,
             self._soil,
         )
         points[:, 2] -= floor_depth_m
-        edge, shell, friction = faces.is_edge, ~faces.is_edge, math.tan(self._soil.steel_friction)
+        edge, shell, friction = faces.is_edge, self._is_shell, math.tan(self._soil.steel_friction)
         return (
             Patches.alike(points[shell], -normals[shell], limits[shell], friction, PatchKind.PRESSURE),
             Patches.alike(points[edge], -normals[edge], limits[edge], friction, PatchKind.PENETRATION),
-            Patches.joined(*(self._side(ground, rotation, raised, floor_depth_m, side) for side in (0, 1))),
+            self._side(ground, rotation, raised, floor_depth_m, 0),
+            self._side(ground, rotation, raised, floor_depth_m, 1),
         )
 
     def _side(
@@ -237,9 +274,19 @@ class PlatePressure:
         """Return what the ground holds against the right (0) or left (1) side plate."""
         normal = np.ascontiguousarray(rotation[:, 1]) * (2.0 * side - 1.0)
         points, limits = side_limits(*ground, raised + self._outline_t[side] @ rotation.T, normal, self._soil)
+        if not limits.any():
+            return Patches.none()
         points[:, 2] -= floor_depth_m
         normals = np.broadcast_to(-normal, points.shape)
         return Patches.alike(points, normals, limits, math.tan(self._soil.steel_friction), PatchKind.PRESSURE)
+
+
+def _velocities(tool: Tool, points_t: Array) -> Array:
+    """Return the velocities (n, 3) [m/s] of points of a tool."""
+    arms, (wx, wy, wz) = points_t @ tool.rotation_w.T, tool.angular_velocity_w.tolist()
+    x, y, z = arms.T
+    turning = np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
+    return np.asarray(tool.linear_velocity_w + turning)
 
 
 def _forward(rotation: Array) -> Level:

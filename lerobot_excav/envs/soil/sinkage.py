@@ -20,17 +20,18 @@ def renewal_lengths(points: Array, shares: Array, is_edge: Bools, velocity: Arra
     It is the distance from the front of the contact, over the buried pieces of the shell, each as wide as a row. The
     edge is a contact of its own, as long as it is thick.
     """
-    lengths = np.full(len(points), PLATE_THICKNESS_M)
+    lengths, ways = np.zeros(len(points)), np.zeros(len(points))
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
-    if speed == 0.0:
-        return lengths
     front = -math.inf
-    ways = (points[:, 0] * velocity[0] + points[:, 1] * velocity[1]) / speed
     for k in range(len(points)):
+        lengths[k] = PLATE_THICKNESS_M
+        if speed == 0.0:
+            continue
+        ways[k] = (points[k, 0] * velocity[0] + points[k, 1] * velocity[1]) / speed
         if shares[k] > 0.0 and not is_edge[k]:
             front = max(front, ways[k] + 0.5 * width)
     for k in range(len(points)):
-        if not is_edge[k]:
+        if speed > 0.0 and not is_edge[k]:
             lengths[k] = max(PLATE_THICKNESS_M, front - ways[k])
     return lengths
 

@@ -1,6 +1,6 @@
 """The digging tool as the soil sees it, and what the soil answers."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -192,7 +192,15 @@ class Reaction:
 
     def with_impulse(self, impulse: Array) -> "Reaction":
         """Return the same with an impulse (6,): linear [N s], and angular about the tool origin [N m s]."""
-        return replace(self, impulse_w_ns=impulse[:3], angular_impulse_w_nms=impulse[3:])
+        return Reaction(
+            force_w_n=self.force_w_n,
+            torque_w_nm=self.torque_w_nm,
+            payload_mass_kg=self.payload_mass_kg,
+            payload_com_t=self.payload_com_t,
+            patches=self.patches,
+            impulse_w_ns=impulse[:3],
+            angular_impulse_w_nms=impulse[3:],
+        )
 
     @classmethod
     def free(cls, payload_mass_kg: float, payload_com_t: Array) -> "Reaction":

@@ -120,3 +120,18 @@ def test_a_crumb_lands_and_does_not_sink_through_the_ground(mass_kg):
     soil._loose.population.add(np.array([[0.0, 0.0, 0.5]]), np.zeros((1, 3)), np.array([mass_kg]), apart=False)
     fall(soil, 3.0)
     assert soil.airborne_mass_kg == 0.0
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=20)
+def test_weighed_heights_are_those_of_whole_arrays(seed):
+    rng, soil = np.random.default_rng(seed), Soil(extent_m=(2.0, 2.0))
+    soil.add_parcels(rng.uniform([-1.2, -1.2, 4.0], [1.2, 1.2, 6.0], (60, 3)), np.zeros((60, 3)))
+    state, expected = soil._loose.population.state, soil.heights_m.copy()
+    state.load[::3] = 1
+    lies = (state.load == 0) & (np.abs(state.positions[:, :2]) < 1.0).all(axis=1)
+    cells = np.clip(np.rint((state.positions[lies, :2] - soil.x_w[0]) / 0.05).astype(int), 0, 39)
+    np.add.at(expected, tuple(cells.T), state.masses[lies] / soil.density_kg_m3 / 0.05**2)
+    np.testing.assert_allclose(soil._loose.weighed_heights(), expected, rtol=1e-12)
+    state.load[:] = 1
+    np.testing.assert_array_equal(soil._loose.weighed_heights(), soil.heights_m)

@@ -97,7 +97,7 @@ def patch_speeds(rows: Array, velocity: Array) -> Array:
 @kernel
 def patch_impulses(speeds: Array, limits: Array, grips: Array) -> Array:
     """Return the impulse of each patch along its axes at given speeds, (k, 3) [N s]."""
-    result = np.zeros_like(speeds)
+    result = np.zeros((len(limits), 3))
     for k in range(len(limits)):
         if speeds[k, 0] < 0.0:
             result[k, 0] = limits[k] * min(1.0, -speeds[k, 0] / CREEP_SPEED_M_S)
@@ -118,7 +118,7 @@ def _add_outer(matrix: Array, factor: float, row: Array) -> None:
 @kernel
 def _curvature(rows: Array, speeds: Array, limits: Array, grips: Array, inertia: Array) -> Array:
     """Return the second derivatives of the function by the joint velocities."""
-    result = inertia.copy()
+    result, across = inertia.copy(), np.zeros(len(inertia))
     for k in range(len(limits)):
         if -CREEP_SPEED_M_S < speeds[k, 0] < 0.0:
             _add_outer(result, limits[k] / CREEP_SPEED_M_S, rows[k, 0])
@@ -126,7 +126,8 @@ def _curvature(rows: Array, speeds: Array, limits: Array, grips: Array, inertia:
             first, second = speeds[k, 1], speeds[k, 2]
             sliding = np.sqrt(first**2 + second**2)
             if sliding > CREEP_SPEED_M_S:  # at its limit, friction is stiff across the sliding only
-                across = (first * rows[k, 2] - second * rows[k, 1]) / sliding
+                for j in range(len(across)):
+                    across[j] = (first * rows[k, 2, j] - second * rows[k, 1, j]) / sliding
                 _add_outer(result, grips[k] / sliding, across)
             else:
                 _add_outer(result, grips[k] / CREEP_SPEED_M_S, rows[k, 1])
@@ -204,20 +205,26 @@ def _braked_velocity(
     velocity = guess.copy()
     for _ in range(_STEPS):
         speeds = patch_speeds(rows, velocity)
-        gained = np.zeros(len(velocity))
+        gained, downhill = np.zeros(len(velocity)), np.zeros(len(velocity))
+        pushed = _joint_impulse(rows, patch_impulses(speeds, limits, grips))
         for i in range(len(velocity)):
             for j in range(len(velocity)):
                 gained[i] += inertia[i, j] * (velocity[j] - free_velocity[j])
-        slope = gained - _joint_impulse(rows, patch_impulses(speeds, limits, grips))
-        step = solved(_curvature(rows, speeds, limits, grips, inertia), -slope)
-        if np.max(np.abs(step)) < _TOLERANCE:
+            downhill[i] = -(gained[i] - pushed[i])
+        step = solved(_curvature(rows, speeds, limits, grips, inertia), downhill)
+        slope, curvature, has_settled = 0.0, 0.0, True
+        for i in range(len(velocity)):
+            slope += gained[i] * step[i]
+            has_settled = has_settled and abs(step[i]) < _TOLERANCE
+        if has_settled:
             break
-        curvature = 0.0
         for i in range(len(velocity)):
             for j in range(len(velocity)):
                 curvature += step[i] * inertia[i, j] * step[j]
         changes = patch_speeds(rows, step)
-        velocity += step * _lowest_share(speeds, changes, limits, grips, np.sum(gained * step), curvature)
+        share = _lowest_share(speeds, changes, limits, grips, slope, curvature)
+        for i in range(len(velocity)):
+            velocity[i] += step[i] * share
     return velocity
 
 
@@ -234,12 +241,20 @@ def braking_impulse(
         inertia: (n, n) effective inertia of the joints over the substep [kg m2].
         free_velocity: (n,) joint velocities at the end of the substep without soil [rad/s].
     """
-    smooth = np.zeros(len(limits))
+    smooth, grips, rubs = np.zeros(len(limits)), np.zeros(len(limits)), False
     velocity = _braked_velocity(rows, limits, smooth, inertia, free_velocity, free_velocity)
-    grips = frictions * patch_impulses(patch_speeds(rows, velocity), limits, smooth)[:, 0]
-    if np.any(grips > 0.0):
+    impulses = patch_impulses(patch_speeds(rows, velocity), limits, smooth)
+    for k in range(len(limits)):
+        grips[k] = frictions[k] * impulses[k, 0]
+        rubs = rubs or grips[k] > 0.0
+    if rubs:
         velocity = _braked_velocity(rows, limits, grips, inertia, free_velocity, velocity)
     impulses = patch_impulses(patch_speeds(rows, velocity), limits, grips)
     total = _joint_impulse(rows, impulses)
     share = _passive_share(inertia, free_velocity, total)
-    return share * total, share * impulses
+    for j in range(len(total)):
+        total[j] = share * total[j]
+    for k in range(len(limits)):
+        for a in range(3):
+            impulses[k, a] = share * impulses[k, a]
+    return total, impulses

@@ -33,12 +33,15 @@ def free_velocity(
     The inertia (n, n) [kg m2] becomes the effective one, in place: a servo below its limit adds `servo_inertia`.
     The other arguments are forces on the joints (n,) [N m], named as in `mujoco.MjData`.
     """
-    forces = passive + actuator + applied - bias
+    forces = np.zeros(len(bias))
     for j in range(len(forces)):
-        forces[j] += constraint[j]
+        forces[j] = passive[j] + actuator[j] + applied[j] - bias[j] + constraint[j]
         if abs(servo_forces[j]) < servo_limits[j]:
             inertia[j, j] += servo_inertia[j]
-    return joint_vel + _SUBSTEP_S * solved(inertia, forces)
+    velocity = solved(inertia, forces)
+    for j in range(len(forces)):
+        velocity[j] = joint_vel[j] + _SUBSTEP_S * velocity[j]
+    return velocity
 
 
 @kernel
@@ -69,7 +72,9 @@ def resisting_force(
         for b in range(3):
             force_w[a] += turn[a, b] * push_t[b]
         force_w[a] /= _SUBSTEP_S
-    return total / _SUBSTEP_S, force_w
+    for j in range(len(total)):
+        total[j] /= _SUBSTEP_S
+    return total, force_w
 
 
 class JointResistance:
@@ -160,8 +165,10 @@ def patch_axes(normals: Array) -> Array:
     axes = np.zeros((len(normals), 3, 3))
     for k in range(len(normals)):
         normal, first, second = normals[k], axes[k, 1], axes[k, 2]
-        # The world axis that leans least to the normal gives the first tangent.
-        least = np.argmin(np.abs(normal))
+        least = 0  # the world axis that leans least to the normal gives the first tangent
+        for a in range(1, 3):
+            if abs(normal[a]) < abs(normal[least]):
+                least = a
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
             axes[k, 0, a] = normal[a]

@@ -112,7 +112,8 @@ class Payload:
         # A jump of the mass would kick the joints; its rate is bounded, so a large change may take longer.
         self.mass_kg += min(max((mass_kg - self.mass_kg) / substeps, -_LARGEST_CHANGE_KG), _LARGEST_CHANGE_KG)
         self._has_shifted = approached(self._com_t, self._com_before_t, com_t, substeps, shifts=mass_kg > 0.0)
-        self._write()
+        if self._has_shifted or self.mass_kg != self._mass_before_kg:
+            self._write()
 
     def apply_momentum(self, data: mujoco.MjData) -> None:
         """Add to `qfrc_applied` what the last `approach` costs; call it between `mj_step1` and `mj_step2`.

@@ -8,5 +8,6 @@ ground       contact with the height fields
 dynamics     sub-steps
 birth        soil that the bucket cuts becomes parcels
 load         which parcels the bucket carries, their sleep
+settling     which parcels have come to rest
 population   all parcels of a soil
 """

@@ -83,6 +83,8 @@ class Intake:
         """Take whole parcels out of the bins; return where they begin, (n, 3) in the tool frame [m]."""
         count, volumes = int(self.waiting_m3 / parcel_m3), self.bins.volumes
         points = np.zeros((count, 3))
+        if count == 0:
+            return points
         for k in range(count):
             i, j = np.unravel_index(int(np.argmax(volumes)), volumes.shape)
             volumes[i, j] -= parcel_m3

@@ -128,6 +128,16 @@ def _integrate(state: State, dt: float) -> None:
 
 
 @kernel
+def greatest(heights: Array) -> float:
+    """Return the greatest of some heights (nx, ny) [m]."""
+    most = heights[0, 0]
+    for i in range(heights.shape[0]):
+        for j in range(heights.shape[1]):
+            most = max(most, heights[i, j])
+    return float(most)
+
+
+@kernel
 def advance(
     state: State,
     pairs: Pairs,
@@ -147,12 +157,14 @@ def advance(
     What others than the load and the ground give to load and plates is added to `pushes` (6,), as `add_impulse` does.
     Returns the neighbours now, the other list, and the fastest hit on a sleeping parcel [m/s].
     """
-    highest = max(site.heights.max(), site.level_z)
+    highest = max(greatest(site.heights), site.level_z)
     if site.box.half_x > 0.0:
-        highest = max(highest, site.box.floor_z + site.box_heights.max())
+        highest = max(highest, site.box.floor_z + greatest(site.box_heights))
     new = find_pairs(state.positions, state.radii, state.asleep, pairs, old_rows, spare)
     pairs, spare = new, pairs
-    same_rows = np.arange(len(state.masses))
+    same_rows = np.zeros(len(state.masses), dtype=np.int64)
+    for i in range(len(same_rows)):
+        same_rows[i] = i
     walls = len(tool.profile) + 1
     hit = 0.0
     state.ground[:] = TOUCHES_NOTHING

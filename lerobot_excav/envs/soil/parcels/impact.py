@@ -13,7 +13,7 @@ The ground's force on the load is left out: the forces on edge and plates stand 
 
 import numpy as np
 
-from lerobot_excav.envs.soil.arrays import Array, Vector
+from lerobot_excav.envs.soil.arrays import Array, Vector, vector_product
 from lerobot_excav.envs.soil.compiled import kernel
 from lerobot_excav.envs.soil.parcels.contact import cross
 from lerobot_excav.envs.soil.parcels.store import State
@@ -92,7 +92,7 @@ class Impact:
         joined_kg = mass_kg - self._mass_kg
         if joined_kg > 0.0:
             centre = moment / mass_kg
-            taken = joined_kg * (linear + np.cross(angular, centre - position))
-            given = given + np.concatenate([taken, np.cross(centre, taken)])
+            taken = joined_kg * (linear + vector_product(angular, centre - position))
+            given = given + np.concatenate([taken, vector_product(centre, taken)])
         self._mass_kg = mass_kg
-        self.impulse = np.concatenate([given[:3], given[3:] - np.cross(position, given[:3])])
+        self.impulse = np.concatenate([given[:3], given[3:] - vector_product(position, given[:3])])

@@ -141,7 +141,7 @@ class Rest:
             self._acceleration += share * ((tool.linear - self._velocity) / dt_s - self._acceleration)
         self._velocity = tool.linear.copy()
         weight = (np.array([0.0, 0.0, -GRAVITY_M_S2]) - self._acceleration) @ tool.rotations[-1]
-        length = float(np.linalg.norm(weight))
+        length = math.sqrt(weight.dot(weight))
         return np.asarray(weight / length) if length > 0.0 else np.array([0.0, 0.0, -1.0])
 
 

@@ -84,7 +84,8 @@ def _more_room(pairs: Pairs) -> Pairs:
     """Return a list with twice the room and the same pairs found so far."""
     room = 2 * len(pairs.partner)
     first, second = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
-    first[: room // 2], second[: room // 2] = pairs.first, pairs.second
+    for k in range(len(pairs.first)):
+        first[k], second[k] = pairs.first[k], pairs.second[k]
     partner, closed = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.uint8)
     springs = np.zeros((room, SPRINGS))
     return Pairs(pairs.start, partner, closed, springs, pairs.anchors, first, second, pairs.last, pairs.before)
@@ -95,8 +96,11 @@ def _find_near(
     positions: Array, radii: Array, asleep: Flags, first: Indices, second: Indices, last: Indices, before: Indices
 ) -> int:
     """Write all pairs within the skin, first < second, in no order; return their number, which may exceed the room."""
-    skin = SKIN * radii.max()
-    size = 2.0 * radii.max() + skin
+    largest = 0.0
+    for i in range(len(radii)):
+        largest = max(largest, radii[i])
+    skin = SKIN * largest
+    size = 2.0 * largest + skin
     _fill_cells(positions, size, last, before)
     count, room = 0, len(first)
     for i in range(len(positions)):
@@ -149,7 +153,9 @@ def find_pairs(positions: Array, radii: Array, asleep: Flags, old: Pairs, old_ro
     _sort_rows(new.first, new.second, count, n, new.start, new.partner, new.before)
     new.closed[:count] = 0
     new.springs[:count] = 0.0
-    new.anchors[:n] = positions
+    for i in range(n):
+        for a in range(3):
+            new.anchors[i, a] = positions[i, a]
     _remember(old_rows, old, new)
     return new
 

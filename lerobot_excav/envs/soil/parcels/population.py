@@ -1,36 +1,29 @@
 """All parcels of a soil: they join, move, carry, land and leave."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lerobot_excav.envs.soil.arrays import Array, Bools, Flags, Indices
+from lerobot_excav.envs.soil.arrays import Array, Bools, Flags, Indices, vector_product
 from lerobot_excav.envs.soil.parcels.dynamics import Laws, advance, carry
-from lerobot_excav.envs.soil.parcels.ground import Site, ground_below
+from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.impact import Impact
 from lerobot_excav.envs.soil.parcels.joining import CROWDED, MOST_JOINED, STAYS, WITHOUT_ROOM, join
 from lerobot_excav.envs.soil.parcels.load import Rest, put_to_sleep
 from lerobot_excav.envs.soil.parcels.pairs import enlarged, room_for
 from lerobot_excav.envs.soil.parcels.plates import ToolPath, bucket_reach
+from lerobot_excav.envs.soil.parcels.settling import find_settled
 from lerobot_excav.envs.soil.parcels.store import (
-    OUTSIDE_OF_SHELL,
     TOUCHES_BOX_FLOOR,
     TOUCHES_GROUND,
-    TOUCHES_NOTHING,
-    TOUCHES_OUTSIDE,
     State,
     copy_rows,
     empty_state,
     keep,
     rows,
 )
-
-SETTLING_SPEED_M_S = 0.4
-"""A parcel on the ground slower than this merges with it (soil.md: 0.3 to 0.5 m/s)."""
-
-SETTLING_TIME_S = 0.1
-"""How long it has to be so slow."""
 
 SETTLING_PACE = 0.25
 """Near a bucket that moves, a parcel rests only if it is slower than this share of the edge's speed: what goes with the
@@ -45,10 +38,9 @@ STANDING_M_S = 0.02
 NEAR_BUCKET_M = 0.45
 """How far beyond the bucket's corners soil may move along with it: the heap before its opening (guess)."""
 
-DROPPING_TIME_S = 1.0
-"""How long a parcel may rest on steel or on others before it drops to the ground below (guess)."""
-
 _FIRST_CAPACITY = 1024
+
+_NOWHERE: Array = np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,6 +60,9 @@ class Landed:
     def is_in_box(self) -> Bools:
         """Tell which lay in the target box."""
         return np.asarray(self.place == TOUCHES_BOX_FLOOR)
+
+
+_NONE_LANDED = Landed(points_w=np.zeros((0, 2)), masses_kg=np.zeros(0), place=np.zeros(0, dtype=np.uint8))
 
 
 class Population:
@@ -197,19 +192,17 @@ class Population:
         self.state.spins[sleeping] = 0.0
         self._rest.clear()
 
-    def _settling_speeds(self) -> Array:
-        """Return the speeds [m/s] below which parcels may be at rest, (n,)."""
-        speeds = np.full(len(self.state.masses), SETTLING_SPEED_M_S)
+    def _stirred(self) -> tuple[Array, float, float]:
+        """Return around what place [m] and how far [m] the bucket stirs the soil, and at what speed [m/s]."""
         tool = self._tool
         if tool is None or not tool.present:
-            return speeds
+            return _NOWHERE, 0.0, 0.0
         edge = tool.rotations[-1] @ np.array([tool.profile[0, 0], 0.0, tool.profile[0, 1]])
-        pace = float(np.linalg.norm(tool.linear + np.cross(tool.angular, edge)))
-        if pace > STANDING_M_S:
-            away = self.state.positions - tool.positions[-1]
-            near = (away**2).sum(axis=1) < (bucket_reach(tool) + NEAR_BUCKET_M) ** 2
-            speeds[near] = min(SETTLING_SPEED_M_S, SETTLING_PACE * pace + STIRRING_M_S)
-        return speeds
+        velocity = tool.linear + vector_product(tool.angular, edge)
+        pace = math.sqrt(velocity.dot(velocity))
+        if pace <= STANDING_M_S:
+            return _NOWHERE, 0.0, 0.0
+        return tool.positions[-1], bucket_reach(tool) + NEAR_BUCKET_M, SETTLING_PACE * pace + STIRRING_M_S
 
     def settle(self, site: Site, dt_s: float) -> Landed:
         """Take out the parcels that have come to rest.
@@ -219,15 +212,9 @@ class Population:
         for long, say on the rim of the box, drops to what is below it. `dt_s` is the duration of the step before.
         """
         state = self.state
-        loose = (state.load == 0) & (state.asleep == 0)
-        slow = (state.velocities**2).sum(axis=1) < self._settling_speeds() ** 2
-        state.calm_s[:] = np.where(loose & slow, state.calm_s + dt_s, 0.0)
-        for i in np.flatnonzero((state.calm_s >= DROPPING_TIME_S) & (state.ground == TOUCHES_NOTHING)):
-            state.ground[i] = ground_below(site, state.positions[i, 0], state.positions[i, 1])[0]
-        grounded = loose & (state.ground != TOUCHES_NOTHING)
-        caught = (state.shell == OUTSIDE_OF_SHELL) & (state.ground == TOUCHES_GROUND)
-        at_rest = state.calm_s >= SETTLING_TIME_S
-        gone = grounded & (caught | at_rest | (state.ground == TOUCHES_OUTSIDE))
+        if len(state.masses) == 0:
+            return _NONE_LANDED
+        gone = find_settled(state, site, *self._stirred(), dt_s)
         landed = Landed(points_w=state.positions[gone, :2], masses_kg=state.masses[gone], place=state.ground[gone])
         if len(landed.masses_kg):
             self.state = rows(self._all, keep(state, ~gone))

@@ -1,5 +1,6 @@
 """Task state: what is measured at every tick to judge a cycle. Never an input of a policy."""
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -80,7 +81,8 @@ class TaskMeter:
 
     def _measure_places(self) -> None:
         edge_w = self._worksite.machine.cutting_edge_pos_w
-        self.state.distance_to_target_m = float(np.linalg.norm(edge_w - self._target.center_w))
+        way_w = edge_w - self._target.center_w
+        self.state.distance_to_target_m = math.sqrt(way_w.dot(way_w))
         self.state.distance_to_box_m = distance_to_box_m(edge_w)
         self.state.bucket_depth_below_dig_plane_m = depth_below_dig_plane_m(self._worksite.machine.tool())
 

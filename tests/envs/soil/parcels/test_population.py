@@ -13,7 +13,7 @@ from lerobot_excav.envs.soil.height_field import Grid
 from lerobot_excav.envs.soil.parcels import population as module
 from lerobot_excav.envs.soil.parcels.ground import Site
 from lerobot_excav.envs.soil.parcels.plates import NO_BOX
-from lerobot_excav.envs.soil.parcels.population import SETTLING_SPEED_M_S, SETTLING_TIME_S
+from lerobot_excav.envs.soil.parcels.settling import SETTLING_SPEED_M_S, SETTLING_TIME_S
 from lerobot_excav.envs.soil.parcels.store import (
     OUTSIDE_OF_SHELL,
     TOUCHES_BOX_FLOOR,
