@@ -207,7 +207,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._observation, *_, info = env.step(command)
         self._is_homing = False
         # LeRobot records the action as it came.
-        self._log.note_action(state, wanted.tolist(), info.get("target_id"))
+        self._log.note_action(state, wanted.tolist(), info.get("target_id"), info.get("command_frame", 0))
         if info["mask_missing_frames"] > self._held_frames:
             self._log.note_held()
         self._held_frames = info["mask_missing_frames"]

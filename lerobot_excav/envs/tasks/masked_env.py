@@ -359,6 +359,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             "task_state": self.task_state,
             "scene_id": self.scene_id,
             "target_id": self.target_id,
+            "command_frame": self.command.since_frame,
             "mask_missing": self.mask_missing,
             "mask_missing_frames": self._missing_frames,
         }

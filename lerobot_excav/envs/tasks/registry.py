@@ -15,17 +15,36 @@ from lerobot_excav.setting import declared_settings
 TASKS: dict[str, TaskSpec] = {}
 """Tasks by their id."""
 
+SHARED_BY_A_ROBOT = (
+    *("env_type", "cameras", "views", "state_names", "action_names", "action_low", "action_high", "task_state_names"),
+    *("settings", "simulation_version", "changes", "target_count"),
+)
+"""What all tasks of a robot have in common, so that their recordings have the same columns and can be merged."""
+
 
 def register_task(spec: TaskSpec) -> None:
     """Add a task, and register it with Gymnasium; adding the same one again changes nothing.
 
     Raises:
-        ConfigurationError: Another task has this id.
+        ConfigurationError: Another task has this id, or another task of the robot differs in what a robot's tasks share.
     """
+    _require_fitting_robot(spec)
     known = TASKS.setdefault(spec.id, spec)
     require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
     # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
     gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
+
+
+def _require_fitting_robot(spec: TaskSpec) -> None:
+    for other in TASKS.values():
+        if other.robot_type == spec.robot_type:
+            unlike = [name for name in SHARED_BY_A_ROBOT if getattr(other, name) != getattr(spec, name)]
+            require(
+                not unlike,
+                f"the task {spec.id!r} has another {', '.join(unlike)} than {other.id!r}, which has the same "
+                f"robot_type={spec.robot_type!r}; make them equal, or give the new task a robot_type and an env_type "
+                "of its own",
+            )
 
 
 def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:
@@ -62,15 +81,21 @@ def env_types() -> dict[str, TaskSpec]:
     return types
 
 
-def task_of_robot(robot_type: str | None) -> TaskSpec:
-    """Return the first task of the robot that a dataset was recorded with; all tasks of a robot share its columns.
+def task_of_robot(robot_type: str | None, task_id: str | None = None) -> TaskSpec:
+    """Return a task of the robot that a dataset was recorded with; without an id the first.
+
+    All tasks of a robot share what `SHARED_BY_A_ROBOT` lists, hence their columns.
 
     Raises:
-        DatasetError: It was recorded with another robot.
+        DatasetError: It was recorded with another robot, or the robot has no such task.
     """
-    for spec in TASKS.values():
-        if spec.robot_type == robot_type:
-            return spec
+    tasks = {spec.id: spec for spec in TASKS.values() if spec.robot_type == robot_type}
+    if tasks:
+        if task_id is not None and task_id not in tasks:
+            raise DatasetError(
+                f"excav.task={task_id!r} is not a task of robot_type={robot_type!r}; allowed: {', '.join(tasks)}"
+            )
+        return tasks[task_id] if task_id is not None else next(iter(tasks.values()))
     known = ", ".join(dict.fromkeys(repr(spec.robot_type) for spec in TASKS.values()))
     raise DatasetError(
         f"robot_type={robot_type!r} in meta/info.json is not a simulation of this package; allowed: {known}"
