@@ -126,9 +126,9 @@ def mask_problems(episode: EpisodeTable) -> Iterator[str]:
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
         if len(set(digests[start:end])) != 1:
             yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
-        if start > 0 and digests[start] == digests[start - 1] and targets[start] != targets[start - 1]:
-            if not _corruptions(episode):
-                yield f"the command changes at frame {start}, though the target mask does not"
+        is_other = start > 0 and targets[start] != targets[start - 1]
+        if is_other and digests[start] == digests[start - 1] and not _corruptions(episode):
+            yield f"the command changes at frame {start}, though the target mask does not"
         mask_img = episode.image(MASK_KEY, start)
         if not np.isin(mask_img, (0, 255)).all():
             values = np.unique(mask_img)[:4].tolist()

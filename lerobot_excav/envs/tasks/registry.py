@@ -26,7 +26,7 @@ def register_task(spec: TaskSpec) -> None:
     """Add a task, and register it with Gymnasium; adding the same one again changes nothing.
 
     Raises:
-        ConfigurationError: Another task has this id, or another task of the robot differs in what a robot's tasks share.
+        ConfigurationError: Another task has this id, or the robot has a task with other columns.
     """
     _require_fitting_robot(spec)
     known = TASKS.setdefault(spec.id, spec)
