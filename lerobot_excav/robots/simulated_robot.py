@@ -268,7 +268,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._log.discard()
 
     def _make_order(self) -> TargetOrder:
-        config, count = self.config, self.task_spec.target_count
+        config, count = self.config, self.task_spec.starts_per_scene
         first = config.scene_id * count + config.target_id
         by_episode = config.advance == "episode"
         return TargetOrder(first, by_episode=by_episode, per_scene=count, log_path=self._log.path)

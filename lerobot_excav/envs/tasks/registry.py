@@ -5,6 +5,7 @@ A package of one's own adds a task with `register_task`; environments, recording
 
 import gymnasium as gym
 
+from lerobot_excav.envs.tasks.clear.spec import CLEAR
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.envs.tasks.settings import TaskSettings
@@ -102,5 +103,5 @@ def task_of_robot(robot_type: str | None, task_id: str | None = None) -> TaskSpe
     )
 
 
-for _spec in (SCOOP, GRASP):
+for _spec in (SCOOP, CLEAR, GRASP):
     register_task(_spec)

@@ -47,7 +47,7 @@ class Clearing:
 
     def begin(self, cycle: DigCycle, proposal: Proposal) -> None:
         """Begin a cycle on a region that the planner has proposed."""
-        self.cycle, self._proposal = cycle, proposal
+        self.cycle, self._proposal, self._is_running = cycle, proposal, True
         self._began_s, self._lost_ticks = self._events.time_s, 0
         self._heights_m = self._worksite.soil.heights_m.copy()
         self._exit_w: Any = None
@@ -60,7 +60,8 @@ class Clearing:
 
     def update(self) -> None:
         """Take in the tick that has just passed."""
-        state = self.cycle.update()
+        self.cycle.update()
+        state = self.cycle.state
         self._events.update(len(self.records), self.cycle)
         if self.cycle.carry.lifted_kg is not None and self._exit_w is None:
             self._exit_w = self._worksite.machine.cutting_edge_pos_w.copy()
@@ -84,6 +85,7 @@ class Clearing:
         number, state = len(self.records), self.cycle.state
         self._events.add(end, number, self.cycle, state.deposited_mass_kg if end == DUMPED else state.bucket_mass_kg)
         self.records.append(self._record(end))
+        self._is_running = False
 
     @property
     def left_kg(self) -> float:
@@ -100,12 +102,12 @@ class Clearing:
     @property
     def hard_target_contacts(self) -> int:
         """Hard contacts with the box, in all cycles."""
-        return sum(record.hard_target_contacts for record in self.all_records())
+        running = self.cycle.state.hard_target_contacts if self._is_running else 0
+        return running + sum(record.hard_target_contacts for record in self.records)
 
     def all_records(self) -> list[CycleRecord]:
         """Return the cycles, the running one as it would be if it ended now."""
-        is_running = not self.records or self.records[-1].began_s < self._began_s
-        return [*self.records, self._record(UNFINISHED)] if is_running else self.records
+        return [*self.records, self._record(UNFINISHED)] if self._is_running else self.records
 
     @property
     def events(self) -> list[dict[str, Any]]:

@@ -1,26 +1,12 @@
 """Keep-out zones: rectangles of the ground in which nothing may be dug."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
-from lerobot_excav.errors import require, shown
-
-Zone = Sequence[float]
-"""A rectangle along the axes of the world: least x, least y, greatest x, greatest y [m]."""
-
-
-def require_zones(field: str, zones: Any) -> None:
-    """Raise `ConfigurationError` unless every zone is a rectangle with an area."""
-    for zone in zones:
-        require(
-            len(zone) == 4 and zone[0] < zone[2] and zone[1] < zone[3],
-            f"{field}={shown(zones)}: {shown(zone)} is not a zone; give the least x and y and the greatest x and y of "
-            "a rectangle [m], such as [-0.5, -3.0, 1.0, -1.5]",
-        )
+from lerobot_excav.envs.tasks.scoop.zones import Zone
 
 
 def is_barred(

@@ -13,9 +13,9 @@ from lerobot_excav.envs.tasks.clear.candidates import (
     Candidates,
     find_candidates,
 )
-from lerobot_excav.envs.tasks.clear.keep_out import Zone
 from lerobot_excav.envs.tasks.clear.surface import SeenSurface
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M, Target
+from lerobot_excav.envs.tasks.scoop.zones import Zone
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
 
 

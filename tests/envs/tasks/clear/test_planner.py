@@ -1,16 +1,14 @@
 """Which regions the planner proposes."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.tasks.clear.candidates import LEAST_SWEPT_M3, LONGEST_ONSET_M, RADIUS_RANGE_M
-from lerobot_excav.envs.tasks.clear.keep_out import is_barred, require_zones
+from lerobot_excav.envs.tasks.clear.keep_out import is_barred
 from lerobot_excav.envs.tasks.clear.planner import plan_targets
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M
-from lerobot_excav.errors import ConfigurationError
 
 from .conftest import surface_of, surface_of_scene
 
@@ -119,9 +117,3 @@ def test_a_zone_between_region_and_machine_bars_it():
     place_w = np.array([[1.0, 0.0, 0.3]])
     for zone, barred in (((-1.5, -0.1, -1.0, 0.1), True), ((-1.5, 0.5, -1.0, 0.6), False), ((1.5, -1, 2, 1), False)):
         assert is_barred(place_w, [zone], inner_radius_m=2.5, half_size_m=0.4).tolist() == [barred]
-
-
-@pytest.mark.parametrize("zone", [[0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0], []])
-def test_a_zone_that_is_no_rectangle_is_refused(zone):
-    with pytest.raises(ConfigurationError, match=r"keep_out=.*is not a zone; give the least x"):
-        require_zones("keep_out", [zone])

@@ -59,7 +59,7 @@ def played(*, opens):
     env.reset(options={"scene_id": 3, "target_id": 1})
     operator = DigOperator(rng=np.random.default_rng(3))
     operator.reset(env)
-    is_over, open_frames = False, 15 if opens else 0
+    is_over, open_frames = False, 30 if opens else 0
     while not is_over:
         action = operator.act(env)
         if open_frames and operator.phase == "carry" and env.agent_pos[0] > 0.5:
