@@ -37,13 +37,14 @@ SCOOP = TaskSpec(
     duration_s=20.0,  # kind: paper
     storage="image",
     settings=ExcavatorSettings,
-    simulation_version=3,
+    simulation_version=4,
     changes={
         1: "soil in the bucket as one volume, ballistic parcels; dig regions hidden from the main view were possible",
         2: "soil in the bucket as parcels in contact, hence other loads, forces and flows; every scene redrawn, with "
         "dig regions in view",
         3: "avalanches with momentum, cuts that stand in cohesive soil, forces of load, heap and fresh ground, impact "
         "of falling soil, another cab camera; every scene redrawn",
+        4: "spills are counted once a way to the box, and only of a lifted load",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",
