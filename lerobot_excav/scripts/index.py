@@ -140,7 +140,7 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
         *(_counts(name, index[name]) for name in start_settings(index)),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
-        *(task_spec("excav.task", task).measures.summary(rows) for task, rows in index.groupby("task")),
+        *(task_spec("excav.task", str(task)).measures.summary(rows) for task, rows in index.groupby("task")),
     ]
     if len(versions) > 1:
         lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")

@@ -1,7 +1,6 @@
 """The environment of every task: a command, shown as a mask of the main view, and a machine that is to obey it."""
 
 from abc import abstractmethod
-from pkgutil import resolve_name
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -15,12 +14,12 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
-from lerobot_excav.envs.tasks.registry import TASKS, task_spec
+from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
 from lerobot_excav.envs.tasks.task import OBS_TYPES
 from lerobot_excav.envs.tasks.watched import WatchedEnv
-from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.errors import ConfigurationError, require_choice
 
 RENDER_MODES = ("rgb_array", None)
 
@@ -75,12 +74,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         depth_info: bool = False,
         **settings: Any,
     ) -> None:
-        env_type = TASKS[self.TASK].env_type
-        self.task_spec = spec = task_spec("task", self.TASK if task is None else task, env_type=env_type)
-        require(
-            spec.id == self.TASK or resolve_name(spec.env_entry) is type(self),
-            f"task={spec.id!r} is not played by {type(self).__name__}; make it by gymnasium.make({spec.gym_id!r})",
-        )
+        self.task_spec = spec = task_played_by(type(self), self.TASK, task)
         self.settings = spec.make_settings(**settings)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("render_mode", render_mode, RENDER_MODES)
@@ -237,13 +231,9 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         """
         super().reset(seed=seed)
         spec = self.task_spec
+        count, default, length = spec.target_count, spec.default_target, self.episode_length
         selection = select_episode(
-            seed,
-            options or {},
-            rng=self.np_random,
-            target_count=spec.target_count,
-            length=self.episode_length,
-            default_target=spec.default_target,
+            seed, options or {}, rng=self.np_random, target_count=count, length=length, default_target=default
         )
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)

@@ -3,6 +3,8 @@
 A package of one's own adds a task with `register_task`; environments, recordings, checks and reports then have it.
 """
 
+from pkgutil import resolve_name
+
 import gymnasium as gym
 
 from lerobot_excav.envs.tasks.clear.spec import CLEAR
@@ -57,6 +59,20 @@ def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -
     known = tuple(id for id, spec in TASKS.items() if env_type in (None, spec.env_type))
     require_choice(field, task_id, known, hint="A task is a gym id without the part before the slash.")
     return TASKS[str(task_id)]
+
+
+def task_played_by(env_class: type, own_task: str, task_id: str | None) -> TaskSpec:
+    """Return the task that a class of environments plays: its own, or another one that names this class.
+
+    Raises:
+        ConfigurationError: There is no such task of this environment, or another class plays it.
+    """
+    spec = task_spec("task", own_task if task_id is None else task_id, env_type=TASKS[own_task].env_type)
+    require(
+        spec.id == own_task or resolve_name(spec.env_entry) is env_class,
+        f"task={spec.id!r} is not played by {env_class.__name__}; make it by gymnasium.make({spec.gym_id!r})",
+    )
+    return spec
 
 
 def task_of_settings(settings: TaskSettings) -> TaskSpec:

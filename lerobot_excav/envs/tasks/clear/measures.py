@@ -1,6 +1,7 @@
 """What is measured of Clear-v0; `docs/reference/metrics.md` defines the measures."""
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any, override
 
 import numpy as np
@@ -121,7 +122,7 @@ class ClearRecord(EpisodeRecord):
         worst = max(FAILURES, key=lambda failure: counts[failure])
         return worst if counts[worst] else NO_FAILURE
 
-    def _percent(self, are_so: Any) -> float:
+    def _percent(self, are_so: Iterable[bool]) -> float:
         return 100.0 * sum(are_so) / max(self.cycle_count, 1)
 
 

@@ -74,7 +74,7 @@ def see_surface(depth_m: NDArray[np.floating], camera: PinholeCamera) -> SeenSur
     points_w = camera.points_w(depth_m).reshape(-1, 3)
     is_soil = _is_in_dig_area(points_w) & (points_w[:, 2] < HIGHEST_SOIL_M)
     counts = tuple(round(extent / MAP_CELL_M) for extent in DIG_AREA_EXTENT_M)
-    x_w, y_w = (MAP_CELL_M * (np.arange(n) + 0.5 - 0.5 * n) for n in counts)
+    x_w, y_w = (MAP_CELL_M * (np.arange(n, dtype=np.float64) + 0.5 - 0.5 * n) for n in counts)
     means_w, is_seen = _means(points_w[is_soil], counts)
     is_seen &= ~_rises_too_steeply(np.where(is_seen, means_w[..., 2], np.inf))
     heights_m = _nearest_seen(means_w[..., 2], is_seen)
@@ -83,7 +83,7 @@ def see_surface(depth_m: NDArray[np.floating], camera: PinholeCamera) -> SeenSur
     beside_x, beside_y = x_w[:, None] - means_w[..., 0], y_w[None, :] - means_w[..., 1]
     at_centre_m = heights_m + slope_x * beside_x + slope_y * beside_y
     heights_m = np.maximum(_nearest_seen(at_centre_m, is_seen), 0.0)
-    return SeenSurface(x_w=x_w, y_w=y_w, heights_m=heights_m, is_seen=is_seen)
+    return SeenSurface(x_w=np.asarray(x_w), y_w=np.asarray(y_w), heights_m=heights_m, is_seen=is_seen)
 
 
 def _is_in_dig_area(points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
