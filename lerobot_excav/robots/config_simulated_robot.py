@@ -58,7 +58,12 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
             f"robot.episode_length={length} has no effect: the command ends an episode. Leave it out; lerobot-record "
             "takes --dataset.episode_time_s.",
         )
-        _ = self.task_spec  # a robot without such a task is refused at once
+        starts = self.task_spec.starts_per_scene  # a robot without such a task is refused at once
+        require(
+            self.target_id < starts,
+            f"robot.target_id={self.target_id} is not possible with robot.task={self.task_spec.id!r}, which chooses "
+            "its targets itself; leave it out",
+        )
 
     @property
     def task_spec(self) -> TaskSpec:

@@ -21,7 +21,7 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
   and of higher ones was not kept.
 - `action`: a frame, as LeRobot records it: the state that was observed, and the action that was carried out next, both
   float32 and exact.
-- `command`: another target is commanded from here on.
+- `command`: another command holds from here on; its target may have the number of the one before.
 - `held`: before this, the machine was held still until its mask was found.
 - `restart`: the scene was restarted or changed instead of carrying the frame's action out. State and action are null
   where LeRobot had no frame to record.
@@ -67,7 +67,7 @@ class SessionLog:
         }
         self._is_begun = False  # whether this session's first line is written
         self._is_running = False  # whether an episode is
-        self._target_id: int | None = None
+        self._command: tuple[int | None, int] = (None, 0)  # target, and since which action
         self._frames = 0  # of the running episode
 
     def start(self) -> None:
@@ -97,17 +97,23 @@ class SessionLog:
             self._keep_others_away()
             self._write(self._session)
         self._is_begun = self._is_running = True
-        self._target_id, self._frames = target_id, 0
+        self._command, self._frames = (target_id, 0), 0
         start = {"episode_index": episode_index, "scene_id": scene_id, "target_id": target_id}
         self._write({"event": "episode", **start})
 
-    def note_action(self, state: Sequence[float], action: Sequence[float], target_id: int | None) -> None:
-        """Note a frame whose action was carried out, after which a target is commanded."""
+    def note_action(
+        self, state: Sequence[float], action: Sequence[float], target_id: int | None, command_frame: int = 0
+    ) -> None:
+        """Note a frame whose action was carried out, after which a target is commanded, since so many actions.
+
+        A task may command another region under the same number.
+        """
         if not self._is_running:
             return
         events: list[dict[str, Any]] = [{"event": "action", "state": state, "action": action}]
-        if target_id not in (None, self._target_id):
-            self._target_id = target_id
+        command = (target_id, command_frame)
+        if target_id is not None and command != self._command:
+            self._command = command
             events.append({"event": "command", "target_id": target_id})
         self._frames += 1
         self._write(*events)
@@ -122,7 +128,7 @@ class SessionLog:
     ) -> None:
         """Note that a scene was started within the episode, and the frame in which that was asked for."""
         if self._is_running:
-            self._target_id = target_id
+            self._command = (target_id, 0)
             self._frames += state is not None and action is not None
             start = {"scene_id": scene_id, "target_id": target_id}
             self._write({"event": "restart", **start, "state": state, "action": action})

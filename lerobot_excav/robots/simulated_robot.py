@@ -207,7 +207,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._observation, *_, info = env.step(command)
         self._is_homing = False
         # LeRobot records the action as it came.
-        self._log.note_action(state, wanted.tolist(), info.get("target_id"))
+        self._log.note_action(state, wanted.tolist(), info.get("target_id"), info.get("command_frame", 0))
         if info["mask_missing_frames"] > self._held_frames:
             self._log.note_held()
         self._held_frames = info["mask_missing_frames"]
@@ -268,7 +268,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._log.discard()
 
     def _make_order(self) -> TargetOrder:
-        config, count = self.config, self.task_spec.target_count
+        config, count = self.config, self.task_spec.starts_per_scene
         first = config.scene_id * count + config.target_id
         by_episode = config.advance == "episode"
         return TargetOrder(first, by_episode=by_episode, per_scene=count, log_path=self._log.path)

@@ -26,7 +26,7 @@ from lerobot_excav.datasets.format.version_check import episodes_by_version, req
 from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
 from lerobot_excav.datasets.pairs.split import SPLIT_UNITS, Split, split
-from lerobot_excav.envs.tasks.registry import env_types
+from lerobot_excav.envs.tasks.registry import task_spec
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.qc import DatasetArguments
 from lerobot_excav.setting import setting
@@ -140,7 +140,7 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
         *(_counts(name, index[name]) for name in start_settings(index)),
         f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
-        env_types()[index["env"].iloc[0]].measures.summary(index),
+        *(task_spec("excav.task", str(task)).measures.summary(rows) for task, rows in index.groupby("task")),
     ]
     if len(versions) > 1:
         lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")

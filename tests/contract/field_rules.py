@@ -207,7 +207,13 @@ TASK = {
     "target_overlay": flag,
 }
 SOIL = one_of("sand", "gravel", "dirt", "wet_sand")
-EXCAVATOR = {**TASK, "task": one_of("Scoop-v0"), "soil": SOIL, "fidelity": one_of("fast", "standard", "fine")}
+ZONES = {"none", "-0.5,-3,1,-1.5", "0,0,1,1; 2, 2, 3, 3.5"}
+NO_ZONES = ("", "0,0,1", "0,0,0,1", "0,1,1,0", "0,0,1,inf", "nan,0,1,1", "0,0,1,1;", "0,0,1,1,2", "a,0,1,1")
+EXCAVATOR = {
+    **TASK,
+    **{"task": one_of("Scoop-v0", "Clear-v0"), "soil": SOIL, "fidelity": one_of("fast", "standard", "fine")},
+    "keep_out": Rule(lambda v: isinstance(v, str) and v in ZONES, (*ZONES, *NO_ZONES)).beside(task="Clear-v0"),
+}
 FR5 = {**TASK, "task": one_of("FR5Grasp-v0"), "retarget_frame": optional(whole(1, 399))}  # of 400 frames
 DERIVED = ("features", "features_map")  # from the other fields, whatever is given
 ENV = {
@@ -259,7 +265,7 @@ JOYSTICK = {
 SCENES = {
     "first_scene": whole(0, ENDLESS).beside(scenes=1),
     "scenes": whole(1, 100_000),
-    "targets": whole(1, 4),
+    "targets": optional(whole(1, 4)),
     "target_rule": one_of("round", "uniform").beside(targets=1),  # the excavator tells no target as the nearest
     "seed": whole(0, SEED),
 }

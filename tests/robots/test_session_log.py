@@ -41,6 +41,13 @@ def test_a_command_after_the_last_action_is_none(log):
     assert read_session(log.path)[0].schedule == ((2, 2),)
 
 
+def test_a_command_that_names_a_target_of_the_same_number_again_is_noted(log):
+    log.begin(0, scene_id=0, target_id=0)
+    for since in (0, 0, 3, 3, 3):
+        log.note_action(STATE, ACTION, 0, since)
+    assert read_session(log.path)[0].schedule == ((3, 0),)
+
+
 def test_wherever_a_crash_cuts_the_log_off_only_the_last_line_is_lost_and_the_next_session_goes_on(log):
     record(log, 0)
     log.end()

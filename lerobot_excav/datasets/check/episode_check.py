@@ -7,6 +7,7 @@ import numpy as np
 
 from lerobot_excav.datasets.format.episode_table import EpisodeTable
 from lerobot_excav.datasets.format.schema import (
+    COMMAND_KEY,
     MASK_KEY,
     MASK_SOURCE_KEY,
     PAIR_KEY,
@@ -39,11 +40,33 @@ MASK_WORDS = re.compile(
 
 def fact_problems(episode: EpisodeTable) -> Iterator[str]:
     """Describe in plain words which facts of an episode, that have all columns, contradict each other or cannot be."""
-    for find in (_version_problems, _pair_problems, _setting_problems, _mask_word_problems, _outcome_problems):
+    for find in (
+        *(_task_problems, _version_problems, _pair_problems, _command_problems),
+        *(_setting_problems, _mask_word_problems, _outcome_problems),
+    ):
         try:
             yield from find(episode)
         except DatasetError as contradiction:
             yield str(contradiction).removeprefix(f"episode {episode.index}: ")
+            if find is _task_problems:
+                return
+
+
+def _task_problems(episode: EpisodeTable) -> Iterator[str]:
+    _ = episode.spec  # one, and of this robot
+    yield from ()
+
+
+def _command_problems(episode: EpisodeTable) -> Iterator[str]:
+    frames = np.arange(episode.length)
+    since, starts = episode.array(COMMAND_KEY), np.zeros(episode.length, dtype=bool)
+    starts[0], starts[1:] = True, np.diff(since) != 0
+    if (wrong := starts & (since != frames)).any():
+        frame = int(np.argmax(wrong))
+        yield f"{COMMAND_KEY}={since[frame]} at frame {frame}, where a command begins; it has to be {frame}"
+    elif (wrong := ~starts[1:] & (np.diff(episode.target_id) != 0)).any():
+        frame = 1 + int(np.argmax(wrong))
+        yield f"{TARGET_KEY} changes at frame {frame}, though by {COMMAND_KEY} no command begins there"
 
 
 def _version_problems(episode: EpisodeTable) -> Iterator[str]:
@@ -82,9 +105,9 @@ def _outcome_problems(episode: EpisodeTable) -> Iterator[str]:
 
 def action_problems(episode: EpisodeTable) -> Iterator[str]:
     """Describe in plain words which actions are outside of their limits."""
-    names = episode.spec.action_names
+    names = episode.robot.action_names
     for name, values, low, high in zip(
-        names, episode.action.T, episode.spec.action_low, episode.spec.action_high, strict=True
+        names, episode.action.T, episode.robot.action_low, episode.robot.action_high, strict=True
     ):
         margin = ACTION_MARGIN * (high - low)
         outside = values[(values < low - margin) | (values > high + margin)]
@@ -99,11 +122,12 @@ def mask_problems(episode: EpisodeTable) -> Iterator[str]:
     Its pictures can be decoded.
     """
     starts = [0, *(frame for frame, _ in episode.schedule)]
-    digests = episode.image_digests(MASK_KEY)
+    digests, targets = episode.image_digests(MASK_KEY), episode.target_id
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
         if len(set(digests[start:end])) != 1:
             yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
-        if start > 0 and digests[start] == digests[start - 1] and not _corruptions(episode):
+        is_other = start > 0 and targets[start] != targets[start - 1]
+        if is_other and digests[start] == digests[start - 1] and not _corruptions(episode):
             yield f"the command changes at frame {start}, though the target mask does not"
         mask_img = episode.image(MASK_KEY, start)
         if not np.isin(mask_img, (0, 255)).all():

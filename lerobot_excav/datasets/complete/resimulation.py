@@ -108,7 +108,7 @@ def _resimulate(recorded: EpisodeTable, session: SessionEpisode) -> Episode:
         )
     columns = {name: getattr(settings, name) for name in settings.columns()}
     played = play_again(
-        recorded.spec, recorded.action, session.pair, session.schedule, fps=settings.fps, columns=columns
+        session.spec, recorded.action, session.pair, session.schedule, fps=settings.fps, columns=columns
     )
     largest, frame = state_deviation(played, recorded)
     if largest > STATE_TOLERANCE:
@@ -129,7 +129,11 @@ def state_deviation(played: Episode, recorded: EpisodeTable) -> tuple[float, int
 def _write_completed(root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path) -> None:
     """Copy a dataset with the new columns, by LeRobot's own tool."""
     constant = {i: constant_columns(episode, session[i].task_settings) for i, episode in episodes.items()}
-    varying = {schema.TARGET_KEY: "target_id", schema.TASK_STATE_KEY: "task_state"}
+    varying = {
+        schema.TARGET_KEY: "target_id",
+        schema.COMMAND_KEY: "command_frame",
+        schema.TASK_STATE_KEY: "task_state",
+    }
 
     def value(key: str) -> Callable[[Any, Any, Any], Any]:
         if key in varying:

@@ -64,7 +64,9 @@ class DatasetInfo(BaseModel):
 
     @property
     def spec(self) -> TaskSpec:
-        """Task of the robot that the dataset was recorded with; all tasks of a robot share its columns.
+        """First task of the robot that the dataset was recorded with; all tasks of a robot share its columns.
+
+        Which of them an episode plays stands in its column `excav.task`.
 
         Raises:
             DatasetError: It was recorded with another robot.

@@ -19,6 +19,7 @@ from lerobot_excav.datasets.format.frame_files import EpisodeRows, Report, itera
 from lerobot_excav.datasets.format.metadata import EpisodeMetadata, read_episode_metadata
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.pictures import Pictures, StoredImages, VideoSpan
+from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import DatasetError
@@ -31,20 +32,33 @@ class EpisodeTable:
     Attributes:
         index: Episode index.
         length: Number of frames.
-        spec: Task of the robot that it was recorded with.
+        robot: First task of the robot that it was recorded with; all tasks of a robot share its columns.
         columns: The columns asked for, by key, without pictures.
         pictures: The pictures asked for, by key, undecoded.
     """
 
     index: int
     length: int
-    spec: TaskSpec
+    robot: TaskSpec
     columns: dict[str, pa.ChunkedArray]
     pictures: dict[str, Pictures]
 
     def array(self, key: str) -> NDArray[Any]:
         """Return a numeric column, shape (n, k) or (n,)."""
         return np.stack(self.columns[key].to_numpy())
+
+    @property
+    def spec(self) -> TaskSpec:
+        """Task that it plays.
+
+        Raises:
+            DatasetError: The robot has no such task.
+        """
+        task_id = str(self._constant(schema.TASK_KEY))
+        try:
+            return task_of_robot(self.robot.robot_type, task_id)
+        except DatasetError as unknown:
+            raise DatasetError(f"episode {self.index}: {unknown}") from None
 
     @property
     def state(self) -> NDArray[Any]:
@@ -93,9 +107,9 @@ class EpisodeTable:
 
     @property
     def schedule(self) -> Schedule:
-        """Changes of the command, as pairs of frame and target."""
+        """Changes of the command, as pairs of frame and target; another region may have the same number."""
         targets = self.target_id
-        changes = (np.flatnonzero(np.diff(targets)) + 1).tolist()
+        changes = (np.flatnonzero(np.diff(self.array(schema.COMMAND_KEY))) + 1).tolist()
         return tuple((frame, int(targets[frame])) for frame in changes)
 
     @property
@@ -107,10 +121,10 @@ class EpisodeTable:
         """
         pair = Pair.parse(self._constant(schema.PAIR_KEY))
         ids = (self._constant(schema.SCENE_KEY), int(self.target_id[0]))
-        if pair.env != self.spec.env_type:
+        if pair.env != self.robot.env_type:
             raise DatasetError(
                 f"episode {self.index}: {schema.PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's "
-                f"robot_type is that of {self.spec.env_type!r}"
+                f"robot_type is that of {self.robot.env_type!r}"
             )
         if ids != (pair.scene_id, pair.target_id):
             raise DatasetError(
@@ -201,7 +215,7 @@ def episode_table(
     return EpisodeTable(
         index=rows.index,
         length=rows.table.num_rows,
-        spec=info.spec,
+        robot=info.spec,
         columns={key: rows.table[key] for key in keys if key in rows.table.column_names and key not in pictures},
         pictures=pictures,
     )

@@ -26,6 +26,8 @@ TASK_STATE_KEY = "excav.task_state"
 SUCCESS_KEY = "excav.success"
 MASK_SOURCE_KEY = "excav.mask_source"
 SIMULATION_KEY = "excav.simulation_version"
+COMMAND_KEY = "excav.command_frame"
+"""Frame from which on the present command holds: a command may change and yet name a target of the same number."""
 
 
 @with_config(ConfigDict(extra="allow"))
@@ -48,6 +50,10 @@ def setting_key(name: str) -> str:
     return f"excav.{name}"
 
 
+TASK_KEY = setting_key("task")
+"""Which of the robot's tasks is played; all of them share the other columns."""
+
+
 NUMBERING: dict[str, Feature] = {
     "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
     **{
@@ -64,6 +70,7 @@ def excav_features(spec: TaskSpec) -> dict[str, Feature]:
     return {
         SCENE_KEY: _scalar("int64"),
         TARGET_KEY: _scalar("int64"),
+        COMMAND_KEY: _scalar("int64"),
         PAIR_KEY: _scalar("string"),
         TASK_STATE_KEY: _vector(spec.task_state_names),
         SUCCESS_KEY: _scalar("bool"),
@@ -110,7 +117,10 @@ def require_columns(spec: TaskSpec, features: dict[str, Feature]) -> None:
     expected = dataset_features(spec, height=0, width=0)
     missing = [key for key in expected if key not in features]
     if missing:
-        hint = "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`"
+        hint = (
+            "add the excav.* columns of a recording with `lerobot-excav index DATASET --session=FILE`; a dataset that "
+            "an earlier release has written has to be recorded again"
+        )
         raise DatasetError(f"the dataset lacks {', '.join(missing)}; {hint}")
     for key in expected.keys() & features.keys():
         if expected[key]["dtype"] == "image" and features[key]["dtype"] == "video":

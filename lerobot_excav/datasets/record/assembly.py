@@ -87,6 +87,7 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
             schema.STATE_KEY: episode.state[frame],
             schema.ACTION_KEY: episode.action[frame],
             schema.TARGET_KEY: episode.target_id[frame : frame + 1],
+            schema.COMMAND_KEY: episode.command_frame[frame : frame + 1],
             schema.TASK_STATE_KEY: episode.task_state[frame],
         }
         images = {schema.camera_key(camera): frames[frame] for camera, frames in episode.images.items()}

@@ -33,9 +33,10 @@ class PlayedScenes:
     env: TaskSettings
     first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
     scenes: int = setting("How many scenes", default=50, low=1, high=MOST_SCENES)
-    targets: int = setting(
-        "Targets shown per scene: 4 pair every scene with every target, 1 shows each scene once",
-        default=TARGETS_PER_SCENE,
+    targets: int | None = setting(
+        "Targets shown per scene: 4 pair every scene with every target, 1 shows each scene once; left out: 4, and 1 "
+        "with a task that chooses its targets itself",
+        default=None,
         choices=tuple(range(1, TARGETS_PER_SCENE + 1)),
     )
     target_rule: str = setting(
@@ -52,6 +53,7 @@ class PlayedScenes:
             f"env={shown(self.env)} is not the settings of an environment; DemonstrationSettings.of makes them by name",
         )
         option, spec = f"--target_rule={self.target_rule}", self.task_spec
+        self.targets = self.targets or spec.starts_per_scene
         require(
             self.targets == 1 or self.target_rule == "round",
             f"{option} chooses a single target per scene; add --targets=1, or leave it out",
@@ -91,7 +93,13 @@ class PlayedScenes:
             Pair(self.env.ENV_TYPE, scene_set, scene_id, target_id)
             for scene_id in range(self.first_scene, self.first_scene + self.scenes)
             for target_id in targets_of_scene(
-                self.target_rule, self.targets, seed=self.seed, scene_set=scene_set, scene_id=scene_id, nearest=nearest
+                self.target_rule,
+                self.targets or 1,  # it has been filled in
+                seed=self.seed,
+                scene_set=scene_set,
+                scene_id=scene_id,
+                nearest=nearest,
+                default=self.task_spec.default_target,
             )
         ]
 

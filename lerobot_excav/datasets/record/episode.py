@@ -24,6 +24,7 @@ class Episode:
         state: What the policy feels of the machine, (n, s) float32; names and units as its environment has them.
         action: What it was told, (n, a) float32.
         target_id: Target that is commanded, (n,) int64.
+        command_frame: Frame from which on the command holds, (n,) int64.
         task_state: How far the task is, (n, k) float32.
         success: Outcome of the episode.
         mask_missing_frames: Frames in which the machine was held still because no mask was found.
@@ -36,6 +37,7 @@ class Episode:
     state: NDArray[Any]
     action: NDArray[Any]
     target_id: NDArray[Any]
+    command_frame: NDArray[Any]
     task_state: NDArray[Any]
     success: bool
     mask_missing_frames: int
@@ -110,5 +112,6 @@ def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[An
         "state": np.asarray(observation["agent_pos"], dtype=np.float32),
         "action": action,
         "target_id": np.int64(info["target_id"]),
+        "command_frame": np.int64(info["command_frame"]),
         "task_state": np.asarray(info["task_state"], dtype=np.float32),
     }

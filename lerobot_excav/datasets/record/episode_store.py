@@ -26,7 +26,7 @@ from lerobot_excav.whole_file import unfinished, write_whole
 PNG_LEVEL = 1
 
 
-TRACES = ("state", "action", "target_id", "task_state")
+TRACES = ("state", "action", "target_id", "command_frame", "task_state")
 
 
 @with_config(ConfigDict(extra="allow"))

@@ -14,7 +14,14 @@ _STREAM = 0x7A26
 
 
 def targets_of_scene(
-    rule: str, count: int, *, seed: int, scene_set: str, scene_id: int, nearest: Callable[[str, int], int]
+    rule: str,
+    count: int,
+    *,
+    seed: int,
+    scene_set: str,
+    scene_id: int,
+    nearest: Callable[[str, int], int],
+    default: int | None = None,
 ) -> list[int]:
     """Return the targets that a scene is shown with.
 
@@ -26,6 +33,7 @@ def targets_of_scene(
         scene_set: Scene set.
         scene_id: Scene.
         nearest: Returns the nearest target of a scene.
+        default: Target with which `round` begins in every scene, where a task has one.
 
     Raises:
         ConfigurationError: There is no such rule.
@@ -36,4 +44,5 @@ def targets_of_scene(
         return [int(rng.integers(TARGETS_PER_SCENE))]
     if rule == "nearest":
         return [nearest(scene_set, scene_id)]
-    return sorted((scene_id + k) % TARGETS_PER_SCENE for k in range(count))
+    first = scene_id if default is None else default
+    return sorted((first + k) % TARGETS_PER_SCENE for k in range(count))

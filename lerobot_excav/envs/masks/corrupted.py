@@ -13,7 +13,7 @@ from lerobot_excav.errors import ExcavError, require
 
 MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
 """`correct`; `zero`: an empty mask; `random`: the same blob elsewhere in the picture, off its place; `mismatched`: the
-mask of another target."""
+mask of another target, or as `random` where no other can be commanded."""
 
 MASK_NOISES = ("none", "shift", "erode", "dilate")
 """`none`; `shift`: moved in a random direction, kept inside the picture; `erode`: without the pixels near its outside
@@ -58,8 +58,8 @@ class CorruptedSource:
             size = (view.camera.height, view.camera.width)
             empty = np.zeros(size, dtype=bool)
             return TargetMask(pixels=empty, target_id=None, source="none", parameters={"condition": "zero"})
-        if self._condition == "mismatched":
-            others = view.other_commands()
+        others = view.other_commands() if self._condition == "mismatched" else []
+        if others:
             return self._found(view, others[int(rng.choice(len(others)))])
         mask = self._found(view, command)
         if mask is None or self._condition == "correct":

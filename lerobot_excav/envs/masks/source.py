@@ -27,8 +27,8 @@ class MaskView(Protocol):
         """Where the main camera stands, and how it projects."""
 
     @property
-    def scene_key(self) -> tuple[int, int]:
-        """Numbers of the scene set and of the scene; on a real machine any two that name the situation."""
+    def scene_key(self) -> tuple[int, ...]:
+        """Numbers of scene set, scene and perhaps cycle; on a real machine any that name the situation."""
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the main picture, (H, W, 3) uint8."""
@@ -37,7 +37,7 @@ class MaskView(Protocol):
         """Return the distance along the optical axis, registered with the picture, (H, W) float32 [m]."""
 
     def other_commands(self) -> list[Command]:
-        """Return what else could be commanded in this scene, in the order of the targets."""
+        """Return what else could be commanded now, in the order of the targets; there may be nothing."""
 
     def true_mask(self, command: Command) -> Pixels:
         """Return what a simulator knows, (H, W) bool, whatever stands before the target.

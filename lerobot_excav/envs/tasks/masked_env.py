@@ -14,7 +14,7 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
-from lerobot_excav.envs.tasks.registry import TASKS, task_spec
+from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
 from lerobot_excav.envs.tasks.task import OBS_TYPES
@@ -37,8 +37,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     The rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
 
     `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`; `reset(options={"scene_id": …, "target_id": …,
-    "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, and without `commands`
-    the task decides whether the command changes. A reset with nothing draws a scene.
+    "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, or the task's default,
+    and without `commands` the task decides whether the command changes. A reset with nothing draws a scene.
 
     Where the mask source finds nothing, the machine is held still until it does: `reset` and `step` pass as many frames
     as that takes, and `mask_missing_frames` counts them. After `MASK_MISSING_LIMIT_S` the episode is given up:
@@ -74,8 +74,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         depth_info: bool = False,
         **settings: Any,
     ) -> None:
-        env_type = TASKS[self.TASK].env_type
-        self.task_spec = spec = task_spec("task", self.TASK if task is None else task, env_type=env_type)
+        self.task_spec = spec = task_played_by(type(self), self.TASK, task)
         self.settings = spec.make_settings(**settings)
         require_choice("obs_type", obs_type, OBS_TYPES)
         require_choice("render_mode", render_mode, RENDER_MODES)
@@ -168,6 +167,11 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     def _begin_command(self, target_id: int) -> None:
         """Take note that another target is commanded."""
 
+    @property
+    def _target_count(self) -> int:
+        """How many targets can be commanded now."""
+        return self.task_spec.target_count
+
     # What every task shares.
 
     @property
@@ -226,8 +230,11 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             ConfigurationError: An option is unknown or has a value that is not possible.
         """
         super().reset(seed=seed)
-        targets, length = self.task_spec.target_count, self.episode_length
-        selection = select_episode(seed, options or {}, rng=self.np_random, target_count=targets, length=length)
+        spec = self.task_spec
+        count, default, length = spec.target_count, spec.default_target, self.episode_length
+        selection = select_episode(
+            seed, options or {}, rng=self.np_random, target_count=count, length=length, default_target=default
+        )
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
@@ -273,8 +280,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         return self.renderer.camera("main")
 
     @property
-    def scene_key(self) -> tuple[int, int]:
-        """Numbers of the scene set and of the scene."""
+    def scene_key(self) -> tuple[int, ...]:
+        """Numbers of the scene set and of the scene, and of what a task tells apart within it."""
         return SCENE_SETS.index(self.settings.scene_set), self.scene_id
 
     def picture(self) -> NDArray[np.uint8]:
@@ -289,7 +296,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
 
     def other_commands(self) -> list[Command]:
         """Return what else could be commanded in this scene, in the order of the targets."""
-        others = [i for i in range(self.task_spec.target_count) if i != self.target_id]
+        others = [i for i in range(self._target_count) if i != self.target_id]
         return [Command(target_id=i, region=self._region(i), since_frame=self._frame) for i in others]
 
     # The command and its mask.
@@ -359,6 +366,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             "task_state": self.task_state,
             "scene_id": self.scene_id,
             "target_id": self.target_id,
+            "command_frame": self.command.since_frame,
             "mask_missing": self.mask_missing,
             "mask_missing_frames": self._missing_frames,
         }

@@ -109,8 +109,8 @@ class EpisodeRecord(BaseModel):
         return tuple(command.frame for command in self.commands[1:])
 
     @property
-    def mask(self) -> str:
-        """What the mask showed, in words."""
+    def mask_words(self) -> str:
+        """What the mask showed, in words, whenever the command changed."""
         words = [self.mask_condition]
         if self.mask_source != "oracle":
             words.append(f"from {self.mask_source}")
@@ -118,9 +118,13 @@ class EpisodeRecord(BaseModel):
             words.append(f"{self.mask_noise} {self.mask_noise_px} px")
         if self.target_overlay:
             words.append("as overlay")
-        if self.changes:
-            words.append(f"changed at frame {' and '.join(map(str, self.changes))}")
         return ", ".join(words)
+
+    @property
+    def mask(self) -> str:
+        """What the mask showed, in words."""
+        changed = f", changed at frame {' and '.join(map(str, self.changes))}" if self.changes else ""
+        return f"{self.mask_words}{changed}"
 
     @property
     def obeyed_shown_mask(self) -> bool | None:

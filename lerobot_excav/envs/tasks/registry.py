@@ -3,8 +3,11 @@
 A package of one's own adds a task with `register_task`; environments, recordings, checks and reports then have it.
 """
 
+from pkgutil import resolve_name
+
 import gymnasium as gym
 
+from lerobot_excav.envs.tasks.clear.spec import CLEAR
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.envs.tasks.settings import TaskSettings
@@ -15,17 +18,36 @@ from lerobot_excav.setting import declared_settings
 TASKS: dict[str, TaskSpec] = {}
 """Tasks by their id."""
 
+SHARED_BY_A_ROBOT = (
+    *("env_type", "cameras", "views", "state_names", "action_names", "action_low", "action_high", "task_state_names"),
+    *("settings", "simulation_version", "changes", "target_count"),
+)
+"""What all tasks of a robot have in common, so that their recordings have the same columns and can be merged."""
+
 
 def register_task(spec: TaskSpec) -> None:
     """Add a task, and register it with Gymnasium; adding the same one again changes nothing.
 
     Raises:
-        ConfigurationError: Another task has this id.
+        ConfigurationError: Another task has this id, or the robot has a task with other columns.
     """
+    _require_fitting_robot(spec)
     known = TASKS.setdefault(spec.id, spec)
     require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
     # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
     gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
+
+
+def _require_fitting_robot(spec: TaskSpec) -> None:
+    for other in TASKS.values():
+        if other.robot_type == spec.robot_type:
+            unlike = [name for name in SHARED_BY_A_ROBOT if getattr(other, name) != getattr(spec, name)]
+            require(
+                not unlike,
+                f"the task {spec.id!r} has another {', '.join(unlike)} than {other.id!r}, which has the same "
+                f"robot_type={spec.robot_type!r}; make them equal, or give the new task a robot_type and an env_type "
+                "of its own",
+            )
 
 
 def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -> TaskSpec:
@@ -37,6 +59,20 @@ def task_spec(field: str, task_id: str | None, *, env_type: str | None = None) -
     known = tuple(id for id, spec in TASKS.items() if env_type in (None, spec.env_type))
     require_choice(field, task_id, known, hint="A task is a gym id without the part before the slash.")
     return TASKS[str(task_id)]
+
+
+def task_played_by(env_class: type, own_task: str, task_id: str | None) -> TaskSpec:
+    """Return the task that a class of environments plays: its own, or another one that names this class.
+
+    Raises:
+        ConfigurationError: There is no such task of this environment, or another class plays it.
+    """
+    spec = task_spec("task", own_task if task_id is None else task_id, env_type=TASKS[own_task].env_type)
+    require(
+        spec.id == own_task or resolve_name(spec.env_entry) is env_class,
+        f"task={spec.id!r} is not played by {env_class.__name__}; make it by gymnasium.make({spec.gym_id!r})",
+    )
+    return spec
 
 
 def task_of_settings(settings: TaskSettings) -> TaskSpec:
@@ -62,20 +98,26 @@ def env_types() -> dict[str, TaskSpec]:
     return types
 
 
-def task_of_robot(robot_type: str | None) -> TaskSpec:
-    """Return the first task of the robot that a dataset was recorded with; all tasks of a robot share its columns.
+def task_of_robot(robot_type: str | None, task_id: str | None = None) -> TaskSpec:
+    """Return a task of the robot that a dataset was recorded with; without an id the first.
+
+    All tasks of a robot share what `SHARED_BY_A_ROBOT` lists, hence their columns.
 
     Raises:
-        DatasetError: It was recorded with another robot.
+        DatasetError: It was recorded with another robot, or the robot has no such task.
     """
-    for spec in TASKS.values():
-        if spec.robot_type == robot_type:
-            return spec
+    tasks = {spec.id: spec for spec in TASKS.values() if spec.robot_type == robot_type}
+    if tasks:
+        if task_id is not None and task_id not in tasks:
+            raise DatasetError(
+                f"excav.task={task_id!r} is not a task of robot_type={robot_type!r}; allowed: {', '.join(tasks)}"
+            )
+        return tasks[task_id] if task_id is not None else next(iter(tasks.values()))
     known = ", ".join(dict.fromkeys(repr(spec.robot_type) for spec in TASKS.values()))
     raise DatasetError(
         f"robot_type={robot_type!r} in meta/info.json is not a simulation of this package; allowed: {known}"
     )
 
 
-for _spec in (SCOOP, GRASP):
+for _spec in (SCOOP, CLEAR, GRASP):
     register_task(_spec)

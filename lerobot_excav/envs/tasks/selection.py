@@ -24,11 +24,18 @@ class Selection:
 
 
 def select_episode(
-    seed: int | None, options: Mapping[str, Any], *, rng: np.random.Generator, target_count: int, length: int
+    seed: int | None,
+    options: Mapping[str, Any],
+    *,
+    rng: np.random.Generator,
+    target_count: int,
+    length: int,
+    default_target: int | None = None,
 ) -> Selection:
     """Choose scene, target and changes of the command.
 
-    Without options the scene is the seed, or drawn if there is none, and its remainder the target. Options may hold
+    Without options the scene is the seed, or drawn if there is none, and its remainder the target, unless the task has
+    a default of its own. Options may hold
     `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of actions carried out before
     and the target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
 
@@ -41,7 +48,7 @@ def select_episode(
     number = int(rng.integers(2**31)) if seed is None else seed
     scene_id = options.get("scene_id", number)
     require_integer("scene_id", scene_id, 0, 2**63 - 1)
-    target_id = options.get("target_id", scene_id % target_count)
+    target_id = options.get("target_id", scene_id % target_count if default_target is None else default_target)
     require_integer("target_id", target_id, 0, target_count - 1)
     commands = options.get("commands")
     schedule = None if commands is None else checked_schedule(commands, target_count, length)

@@ -56,7 +56,12 @@ class TaskSettings:
     PREFIX: ClassVar[str] = ""
     """What the user writes before the name of a field; configurations of LeRobot say `env.` or `robot.`."""
 
-    task: str = setting("Task, a gym id without the part before the slash", default=dataclasses.MISSING)
+    task: str = setting(
+        "Task, a gym id without the part before the slash",
+        default=dataclasses.MISSING,
+        is_column=True,
+        changes_start=True,
+    )
     fps: int = setting(
         "Frames per second of simulated time; a frame is a whole number of ticks of 0.02 s",
         default=dataclasses.MISSING,

@@ -61,6 +61,8 @@ class TaskSpec:
         task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
         target_count: Targets of a scene.
+        default_target: Target that is commanded first unless options of `reset` say otherwise; None if a scene is shown
+            with all of them in turn.
     """
 
     id: str
@@ -85,6 +87,7 @@ class TaskSpec:
     task_state_tolerance: float
     judges_at_the_end: bool
     target_count: int = TARGETS_PER_SCENE
+    default_target: int | None = None
 
     @property
     def env_type(self) -> str:
@@ -128,6 +131,11 @@ class TaskSpec:
             image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
             spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(self.cameras, image))
         return gym.spaces.Dict(spaces)
+
+    @property
+    def starts_per_scene(self) -> int:
+        """With how many targets a scene is shown in turn, unless the user chooses one."""
+        return self.target_count if self.default_target is None else 1
 
     def length_at(self, fps: int) -> int:
         """Return the time limit at a frame rate [frames]."""

@@ -83,7 +83,8 @@ def copy_frames(episode, source, frames=slice(None)):
         ("action", set_element(4, 2, 1, -1.1), {4: "replay leaves"}),  # the environment clips such actions
         (MASK, copy_frames(5, 6), {6: "target 2 has the mask of target 1"}),
         (MASK, copy_frames(4, 5, slice(3, 4)), {4: "the target mask changes between frames 0 and 5, though the comm"}),
-        (TARGET_KEY, set_frames(2, slice(-1, None)), {5: "the command changes at frame 7, though the target mask d"}),
+        (TARGET_KEY, set_frames(2, slice(-1, None)), {5: "excav.target_id changes at frame 7, though by excav.comm"}),
+        ("excav.command_frame", set_frames(2), {5: "excav.command_frame=2 at frame 0, where a command begins; it has"}),
         (STATE, set_element(5, 0, 0, 0.5), {5: "starts in another state than episode 4 of the same scene"}),
         (MAIN, copy_frames(5, 9, slice(1)), {5: "starts with another view than episode 4 of the same scene"}),
         (STATE, set_element(5, 3, 1, 7.0), {5: "replay leaves the recorded state at frame 3"}),

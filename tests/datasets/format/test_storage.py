@@ -11,7 +11,7 @@ from lerobot.datasets import delete_episodes, merge_datasets, split_dataset
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.format.dataset_info import read_info
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
-from lerobot_excav.datasets.format.schema import PAIR_KEY, SCENE_KEY, TARGET_KEY
+from lerobot_excav.datasets.format.schema import COMMAND_KEY, PAIR_KEY, SCENE_KEY, TARGET_KEY
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index
 from lerobot_excav.datasets.record.simulation import play_demonstration
@@ -62,6 +62,17 @@ def test_episode_tables_read_what_lerobot_reads(dataset):
         for key in (MAIN, MASK):
             np.testing.assert_array_equal(episode.image(key, 5), image(items[5], key))
             np.testing.assert_array_equal(episode.first_frame().image(key, 0), episode.image(key, 0))
+
+
+def test_a_command_that_names_a_target_of_the_same_number_again_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        toy_reach.env.ReachEnv, "_next_target", lambda env: env.target_id if env._frame == CHANGE_FRAME else None
+    )
+    record_toy(tmp_path / "d", scenes=1, targets=1)
+    (episode,) = iterate_episodes(tmp_path / "d", (TARGET_KEY, COMMAND_KEY))
+    assert episode.schedule == ((CHANGE_FRAME, 0),)
+    report = check_dataset(tmp_path / "d", replays=1)
+    assert (report.problems, report.episodes["qc_problem"].tolist()) == ([], [""])
 
 
 def test_a_dataset_with_changed_commands_passes_the_check_with_replays(dataset, tmp_path):

@@ -19,6 +19,7 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
             "pair_uid": f"excavator/train/{scene}/{target}",
             "env": "excavator",
             "scene_set": "train",
+            "task": "Reach-v0",
             "scene_id": scene,
             "target_id": target,
             "soil": "sand",

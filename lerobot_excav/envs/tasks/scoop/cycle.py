@@ -3,9 +3,13 @@
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.scoop.carry import CarryWatch
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.spec import TaskState
 from lerobot_excav.envs.tasks.scoop.targets import Target
@@ -28,6 +32,11 @@ class DigCycle:
         worksite: Where the machine works; the cycle starts at its present state.
         scene: The scene it was reset to.
         target_id: Index of the commanded dig region in `scene.targets`.
+
+    Attributes:
+        target_hit: Whether loading began inside the commanded region; None before.
+        onset_time_s: When it began, since the start of the cycle [s].
+        onset_w: Where: middle of the cutting edge (3,) [m], world frame.
     """
 
     def __init__(self, worksite: Worksite, scene: Scene, target_id: int) -> None:
@@ -37,8 +46,11 @@ class DigCycle:
         self._ticks = 0
         self.scene = scene
         self.target_id = target_id
+        # A load that was left in the bucket by the cycle before is not loaded now.
+        self._was_empty = worksite.soil.payload_mass_kg <= LOADING_ONSET_KG
         self.target_hit: bool | None = None
         self.onset_time_s: float | None = None
+        self.onset_w: NDArray[np.float64] | None = None
 
     @property
     def target(self) -> Target:
@@ -48,8 +60,13 @@ class DigCycle:
     def retarget(self, target_id: int) -> None:
         """Command another dig region from now on; a region that was hit before counts no more."""
         self.target_id = target_id
-        self.target_hit = self.onset_time_s = None
+        self.target_hit = self.onset_time_s = self.onset_w = None
         self._meter.retarget(self.target)
+
+    @property
+    def carry(self) -> CarryWatch:
+        """The way of the present load to the box."""
+        return self._meter.carry
 
     @property
     def state(self) -> TaskState:
@@ -60,8 +77,11 @@ class DigCycle:
         """Take in the tick that has just passed."""
         self._ticks += 1
         state = self._meter.update()
-        if self.target_hit is None and state.bucket_mass_kg > LOADING_ONSET_KG:
-            self.target_hit = bool(self.target.contains(self._worksite.machine.cutting_edge_pos_w))
+        is_loaded = state.bucket_mass_kg > LOADING_ONSET_KG
+        self._was_empty |= not is_loaded
+        if self.target_hit is None and self._was_empty and is_loaded:
+            self.onset_w = np.array(self._worksite.machine.cutting_edge_pos_w)
+            self.target_hit = bool(self.target.contains(self.onset_w))
             self.onset_time_s = self._ticks * TICK_S
         dumped = state.deposited_mass_kg >= LOADING_ONSET_KG and state.bucket_mass_kg < LOADING_ONSET_KG
         settled = dumped and not self._soil_moves_over_box()

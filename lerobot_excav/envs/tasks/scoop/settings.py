@@ -5,7 +5,9 @@ from typing import ClassVar
 
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
+from lerobot_excav.envs.tasks.scoop.zones import NO_ZONES, Zone, parsed_zones
 from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.errors import require
 from lerobot_excav.setting import setting, with_default
 
 
@@ -15,7 +17,12 @@ class ExcavatorSettings(TaskSettings):
 
     ENV_TYPE: ClassVar[str] = "excavator"
 
-    task: str = with_default(TaskSettings, "task", "Scoop-v0")
+    task: str = setting(
+        "Task: Scoop-v0, a single cycle, or Clear-v0, a whole pile",
+        default="Scoop-v0",
+        is_column=True,
+        changes_start=True,
+    )
     fps: int = with_default(TaskSettings, "fps", 10)
     soil: str = setting(
         "Soil preset", default="sand", choices=tuple(PRESETS), also=SoilParameters, is_column=True, changes_start=True
@@ -23,6 +30,27 @@ class ExcavatorSettings(TaskSettings):
     fidelity: str = setting(
         "Numerical effort of the soil", default="standard", choices=tuple(FIDELITIES), is_column=True
     )
+    keep_out: str = setting(
+        "Zones of the ground in which Clear-v0 must not dig: of each the least x and y and the greatest x and y [m], "
+        "such as -0.5,-3,1,-1.5; several are parted by a semicolon, and none is none",
+        default=NO_ZONES,
+        is_column=True,
+        changes_start=True,
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        zones = parsed_zones(f"{self.PREFIX}keep_out", self.keep_out)
+        require(
+            not zones or self.task != "Scoop-v0",
+            f"{self.PREFIX}keep_out={self.keep_out!r} has no effect with {self.PREFIX}task='Scoop-v0', whose regions "
+            "belong to the scene; leave it out, or give --env.task=Clear-v0",
+        )
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """The keep-out zones."""
+        return parsed_zones("keep_out", self.keep_out)
 
     @property
     def soil_name(self) -> str:

@@ -45,7 +45,7 @@ SCOOP = TaskSpec(
         3: "avalanches with momentum, cuts that stand in cohesive soil, forces of load, heap and fresh ground, impact "
         "of falling soil, another cab camera; every scene redrawn",
         4: "slopes at the limit come to rest within seconds, piles of scenes lie a little steeper; what has come loose "
-        "has no cohesion, and parcels pack as they are weighed",
+        "has no cohesion, and parcels pack as they are weighed; a spill is a lifted load that is lost before the box",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",

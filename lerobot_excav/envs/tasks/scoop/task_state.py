@@ -9,14 +9,12 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, TARGET_BOX, distance_to_box_footprint_m
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import Tool, ToolGeometry
+from lerobot_excav.envs.tasks.scoop.carry import CarryWatch
 from lerobot_excav.envs.tasks.scoop.spec import TaskState
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
-# Thresholds of the events (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
+# Threshold of a hard contact (source: xtt001/excavator_testbed, the public code nearest to the paper; kind: paper).
 HARD_CONTACT_FORCE_N = 5000.0
-SPILL_LEAST_PAYLOAD_KG = 50.0
-SPILL_LEAST_DROP_KG = 5.0
-SPILL_BOX_GAIN_KG = 2.0
 FOOTPRINT_FADE_M = 0.25
 
 _HALF_DIG_AREA_M = 0.5 * np.array(DIG_AREA_EXTENT_M)
@@ -35,6 +33,7 @@ class TaskMeter:
         self._target = target
         self._box_mass_start_kg = worksite.soil.box_mass_kg
         self._in_hard_contact = False
+        self.carry = CarryWatch(worksite)
         self.state = TaskState()
         self._measure_places()
 
@@ -46,29 +45,15 @@ class TaskMeter:
     def update(self) -> TaskState:
         """Take in the tick that has just passed and return the state."""
         state = self.state
-        previous_bucket_kg, previous_box_kg = state.bucket_mass_kg, state.deposited_mass_kg
+        previous_bucket_kg = state.bucket_mass_kg
         state.bucket_mass_kg = self._worksite.soil.payload_mass_kg
         state.deposited_mass_kg = max(0.0, self._worksite.soil.box_mass_kg - self._box_mass_start_kg)
         # Soil that leaves the bucket and enters it again counts twice, as in the definition this follows.
         state.excavated_mass_kg += max(0.0, state.bucket_mass_kg - previous_bucket_kg)
-        drop_kg = previous_bucket_kg - state.bucket_mass_kg
-        gain_kg = state.deposited_mass_kg - previous_box_kg
-        state.spill_before_target_events += int(self._is_spill(previous_bucket_kg, drop_kg, gain_kg))
+        state.spill_before_target_events += int(self.carry.update(state.bucket_mass_kg))
         self._count_hard_contact()
         self._measure_places()
         return state
-
-    def _is_spill(self, previous_bucket_kg: float, drop_kg: float, gain_kg: float) -> bool:
-        """Tell whether soil was lost elsewhere than above the box.
-
-        Soil falls for a while before the box gains it, so a drop above the box is no spill either.
-        """
-        return (
-            previous_bucket_kg >= SPILL_LEAST_PAYLOAD_KG
-            and drop_kg >= SPILL_LEAST_DROP_KG
-            and gain_kg < SPILL_BOX_GAIN_KG
-            and bool(distance_to_box_footprint_m(self._worksite.machine.cutting_edge_pos_w) > 0.0)
-        )
 
     def _count_hard_contact(self) -> None:
         """Count one contact per episode of touching, at the moment it becomes hard."""

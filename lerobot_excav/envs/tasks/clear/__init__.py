@@ -1,0 +1,1 @@
+"""Clear-v0: dig a pile away, cycle by cycle, where a planner points."""

@@ -1,0 +1,203 @@
+"""Clear-v0 as a gymnasium environment."""
+
+from dataclasses import asdict, replace
+from typing import Any, override
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.excavator.control import checked_action
+from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.tasks.clear.clearing import Clearing
+from lerobot_excav.envs.tasks.clear.planner import Plan, plan_targets
+from lerobot_excav.envs.tasks.clear.score_overlay import with_scores
+from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
+from lerobot_excav.envs.tasks.clear.surface import SeenSurface, see_surface
+from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
+from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.errors import require
+
+PLANNER_PICTURE_PX = (192, 256)
+"""Height and width of the planner's depth picture [px], whatever policies see: 96 % of the cells with soil are seen,
+with 96 x 128 it is 78 % (kind: tuned)."""
+
+
+class ClearEnv(ExcavatorEnv):
+    """An 8-t excavator that digs a whole pile away, cycle by cycle.
+
+    Task (`Clear-v0`): cycles as of `Scoop-v0` on one pile. When a cycle is over, the target planner looks at the depth
+    picture of `main`, commands the region with the most soil, and the mask changes. `target_id` is the rank of the
+    region among the planner's proposals: 0 unless options of `reset` say otherwise.
+
+    A cycle is over when the bucket has been emptied into the box, when all of a lifted load was lost before the box, or
+    after 25 s. The episode is over after 16 cycles, when nothing is left that is worth a cycle, or at the time limit.
+
+    Scene, observation and action are those of `Scoop-v0`.
+
+    Reward: gain of soil in the box divided by 485 kg, plus 1 on success at the end.
+
+    Success: at least 75 % of the pile is removed and nothing of the machine hit the box hard. `info["is_success"]` is
+    true at the end of the episode only.
+
+    Termination: the last cycle is over, or no region is proposed. Truncation: the time limit `episode_length`.
+
+    The planner needs a graphics context also where the observation holds no pictures. Arguments: see `ExcavatorEnv`;
+    `keep_out` bars zones of the ground.
+
+    Attributes:
+        plan: What the planner proposed last.
+        surface: What it saw.
+    """
+
+    TASK = "Clear-v0"
+
+    plan: Plan
+    surface: SeenSurface
+    _clearing: Clearing
+    _scene: Scene
+    _is_due = False  # whether the next cycle is to be commanded
+    _planner_renderer: WorksiteRenderer | None = None
+
+    @property
+    def clearing(self) -> Clearing:
+        """The course of the episode."""
+        self._require_episode()
+        return self._clearing
+
+    @override
+    def _start(self, scene_id: int, target_id: int) -> None:
+        self._scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)
+        self.worksite.reset(self._scene)
+        self._clearing = Clearing(self.worksite)
+        self._look()
+        require(
+            self.plan.nothing_left is None,
+            f"scene_id={scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another scene, or other "
+            f"zones than keep_out={self._excavator_settings.keep_out!r}",
+        )
+        self._begin_cycle(target_id)
+
+    @override
+    def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
+        command, soil = checked_action(action), self.worksite.soil
+        box_before_kg = soil.box_mass_kg
+        for _ in range(self._ticks_per_frame):
+            self.worksite.tick(command)
+            self._clearing.update()
+        if not self._is_due and self._clearing.end is not None:
+            self._finish_cycle(self._clearing.end)
+        gain = (soil.box_mass_kg - box_before_kg) / FULL_BUCKET_KG
+        is_over = self._is_due and (len(self._clearing.records) >= CYCLES or self.plan.nothing_left is not None)
+        return gain + float(is_over and self.is_success), is_over
+
+    def _finish_cycle(self, end: str) -> None:
+        self._clearing.finish(end)
+        self._look()
+        self._is_due = True
+
+    def _look(self) -> None:
+        """Let the planner look at what is left."""
+        if self._planner_renderer is None:
+            self._planner_renderer = WorksiteRenderer(
+                self.worksite, height=PLANNER_PICTURE_PX[0], width=PLANNER_PICTURE_PX[1]
+            )
+        eye = self._planner_renderer
+        self.surface = see_surface(eye.depth_m("main"), eye.camera("main"))
+        self.plan = plan_targets(self.surface, self._excavator_settings.zones)
+
+    def _begin_cycle(self, target_id: int) -> None:
+        count = len(self.plan.proposals)
+        require(
+            target_id < count,
+            f"target_id={target_id} is not possible: the planner proposes {count} regions here; give one from 0 to "
+            f"{count - 1}, or leave it out",
+        )
+        scene = replace(self._scene, targets=self.plan.targets)
+        self._cycle = DigCycle(self.worksite, scene, target_id)
+        self._clearing.begin(self._cycle, self.plan.proposals[target_id])
+        self._is_due = False
+
+    # Commands.
+
+    @override
+    def _next_target(self) -> int | None:
+        return 0 if self._is_due else None
+
+    @override
+    def _change_command(self) -> None:
+        super()._change_command()
+        if self._is_due:  # a schedule of one's own says nothing of this cycle
+            self._begin_command(0)
+            self._give_command(0)
+
+    @override
+    def _begin_command(self, target_id: int) -> None:
+        if self._is_due:
+            self._begin_cycle(target_id)
+        else:
+            require(target_id < self._target_count, f"commands: target {target_id} is not proposed at this time")
+            self._clearing.recommand(target_id, self.plan.proposals[target_id])
+
+    @property
+    @override
+    def _target_count(self) -> int:
+        return len(self.scene.targets)
+
+    @property
+    @override
+    def scene_key(self) -> tuple[int, ...]:
+        """Numbers of the scene set, of the scene and of the cycle."""
+        return (*super().scene_key, len(self._clearing.records))
+
+    # What is told.
+
+    @property
+    def pile_removed(self) -> float:
+        """Part of the pile that is gone from the dig area."""
+        return self.clearing.pile_removed
+
+    @property
+    @override
+    def is_success(self) -> bool:
+        """Whether enough of the pile is removed, and nothing was hit hard."""
+        return self.pile_removed >= LEAST_REMOVED and self._clearing.hard_target_contacts == 0
+
+    @override
+    def _measures(self) -> dict[str, Any]:
+        settings, clearing = self._excavator_settings, self._clearing
+        records = clearing.all_records()
+        return {
+            "soil": settings.soil_name,
+            "pile_removed": clearing.pile_removed,
+            "retained_mass_kg": sum(record.retained_mass_kg for record in records),
+            "hard_target_contacts": clearing.hard_target_contacts,
+            "spill_before_target_events": sum(record.spill_before_target_events for record in records),
+            "nothing_left": self.plan.nothing_left or "",
+            "cycles": [asdict(record) for record in records],
+            "events": clearing.events,
+        }
+
+    @override
+    def _measured(self) -> tuple[str, ...]:
+        number = min(len(self._clearing.records) + 1, CYCLES)
+        return f"removed {100.0 * self.pile_removed:.0f} %", f"cycle {number}", *super()._measured()[:1]
+
+    @override
+    def _failure(self) -> str | None:
+        if self.clearing.hard_target_contacts > 0:
+            return "hit the box"
+        return "pile not removed" if self.is_over and not self.is_success else None
+
+    def score_picture(self) -> NDArray[np.uint8]:
+        """Return the main picture, (H, W, 3) uint8, with the planner's last scores drawn into it."""
+        self._require_episode()
+        return with_scores(self.picture(), self.depth_m(), self.camera, surface=self.surface, plan=self.plan)
+
+    @override
+    def close(self) -> None:
+        """Free the graphics contexts."""
+        super().close()
+        if self._planner_renderer is not None:
+            self._planner_renderer.close()
+            self._planner_renderer = None

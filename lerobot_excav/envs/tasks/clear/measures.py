@@ -1,0 +1,189 @@
+"""What is measured of Clear-v0; `docs/reference/metrics.md` defines the measures."""
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, override
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, NonNegativeInt
+
+from lerobot_excav.envs.tasks.clear.cycle_record import DUMPED, ENDS, FAILURES, NO_FAILURE, TIMED_OUT
+from lerobot_excav.envs.tasks.clear.event_list import EVENTS
+from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TargetId, TaskMeasures, one_of
+from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+Point = Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
+"""A place [m], world frame."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+class ClearCycle(_Part):
+    """One cycle; `cycle_record.CycleRecord` says what each field is."""
+
+    cycle: NonNegativeInt
+    began_s: NonNegativeFloat
+    duration_s: NonNegativeFloat
+    end: Annotated[str, one_of(ENDS)]
+    target_id: TargetId
+    region_w: Point
+    target_success: bool
+    onset_w: Point | None
+    source_w: Point | None
+    depth_m: float | None
+    exit_w: Point | None
+    retained_mass_kg: float
+    residual_bucket_mass_kg: float
+    hard_target_contacts: NonNegativeInt
+    spill_before_target_events: NonNegativeInt
+    pile_removed: float
+    failure: Annotated[str, one_of((*FAILURES, NO_FAILURE))]
+
+
+class ClearEvent(_Part):
+    """One event; `event_list.EventList` says what each field is."""
+
+    event: Annotated[str, one_of(tuple(dict.fromkeys((*EVENTS, *ENDS))))]
+    time_s: NonNegativeFloat
+    cycle: NonNegativeInt
+    region_w: Point
+    mass_kg: float
+
+
+class ClearRecord(EpisodeRecord):
+    """Outcome of one pile."""
+
+    soil: str  # soil preset
+    fidelity: str  # numerical effort of the soil
+    keep_out: str  # zones in which nothing may be dug
+    pile_removed: float = Field(le=1.0)  # part of the pile that is gone from the dig area
+    retained_mass_kg: float  # soil brought into the box, in all cycles [kg]
+    hard_target_contacts: NonNegativeInt  # hard contacts with the box
+    spill_before_target_events: NonNegativeInt  # losses of soil on the way
+    cycles: tuple[ClearCycle, ...]  # one by one, the last perhaps unfinished
+    events: tuple[ClearEvent, ...]  # what happened when
+
+    @property
+    @override
+    def mask(self) -> str:
+        """What the mask showed, in words; that it changes with every cycle goes without saying."""
+        return self.mask_words
+
+    @property
+    def cycle_count(self) -> int:
+        """How many cycles there were."""
+        return len(self.cycles)
+
+    @property
+    def pile_removed_percent(self) -> float:
+        """Part of the pile that is removed [%]."""
+        return 100.0 * self.pile_removed
+
+    @property
+    def target_success_percent(self) -> float:
+        """Part of the cycles in which loading began inside the commanded region [%]."""
+        return self._percent(cycle.target_success for cycle in self.cycles)
+
+    @property
+    def complete_percent(self) -> float:
+        """Part of the cycles that ended with a dump [%]."""
+        return self._percent(cycle.end == DUMPED for cycle in self.cycles)
+
+    @property
+    def timed_out_percent(self) -> float:
+        """Part of the cycles whose time was over [%]."""
+        return self._percent(cycle.end == TIMED_OUT for cycle in self.cycles)
+
+    @property
+    def spill_percent(self) -> float:
+        """Part of the cycles in which soil was spilled on the way [%]."""
+        return self._percent(cycle.spill_before_target_events > 0 for cycle in self.cycles)
+
+    @property
+    def mass_per_cycle_kg(self) -> float:
+        """Soil brought into the box, per cycle [kg]."""
+        return self.retained_mass_kg / max(self.cycle_count, 1)
+
+    @property
+    def has_hard_contact(self) -> bool:
+        """Whether the box was hit hard."""
+        return self.hard_target_contacts > 0
+
+    @property
+    def commonest_failure(self) -> str:
+        """What went wrong in most cycles that failed, the first of equals; `none` if none did."""
+        counts = Counter(cycle.failure for cycle in self.cycles)
+        worst = max(FAILURES, key=lambda failure: counts[failure])
+        return worst if counts[worst] else NO_FAILURE
+
+    def _percent(self, are_so: Iterable[bool]) -> float:
+        return 100.0 * sum(are_so) / max(self.cycle_count, 1)
+
+
+def clear_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
+    """Return masses [kg] and events of an episode from its task states, (n, 8), whose counts begin anew every cycle."""
+    names = ("deposited_mass_kg", "excavated_mass_kg", "hard_target_contacts", "spill_before_target_events")
+    columns = task_state[:, [TASK_STATE_NAMES.index(name) for name in names]]
+    # Within a cycle nothing of these falls, but for a few grains that leave the box again.
+    ends = np.flatnonzero(np.diff(columns[:, 1]) < 0.0)
+    sums = columns[[*ends, len(columns) - 1]].sum(axis=0)
+    return {
+        "retained_mass_kg": float(sums[0]),
+        "residual_bucket_mass_kg": float(task_state[-1, TASK_STATE_NAMES.index("bucket_mass_kg")]),
+        "excavated_mass_kg": float(sums[1]),
+        "hard_target_contacts": round(float(sums[2])),
+        "spill_before_target_events": round(float(sums[3])),
+    }
+
+
+def clear_summary(index: "pd.DataFrame") -> str:
+    """Describe the outcomes of an index."""
+    return f"retained mass: {index['retained_mass_kg'].mean():.0f} kg per pile on average"
+
+
+def _legend(operator: str | None) -> list[str]:
+    lines = ["Shares of cycles are averaged over piles, each with the same weight."]
+    if operator is None:
+        return lines
+    return [*lines, f"Efficiency: pile removed over the operator's on the same scenes; operator: {operator}."]
+
+
+CLEAR_MEASURES = TaskMeasures(
+    record=ClearRecord,
+    settings={"soil": "soils", "fidelity": "fidelities", "keep_out": "keep-out zones"},
+    shared={},
+    setting={"soil": "soil", "mask": "mask"},
+    columns=(
+        Column(key="pile_removed", header="pile removed [%]", kind=Kind.MEAN, field="pile_removed_percent"),
+        Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
+        Column(key="efficiency", header="efficiency [%]", kind=Kind.RATIO, field="pile_removed"),
+        Column(key="cycles", header="cycles", kind=Kind.MEAN, field="cycle_count"),
+        Column(key="mass_per_cycle_kg", header="retained a cycle [kg]", kind=Kind.MEAN, field="mass_per_cycle_kg"),
+        Column(
+            key="target_success", header="target success [% of cycles]", kind=Kind.MEAN, field="target_success_percent"
+        ),
+        Column(key="complete", header="dumped [% of cycles]", kind=Kind.MEAN, field="complete_percent"),
+        Column(key="timed_out", header="timed out [% of cycles]", kind=Kind.MEAN, field="timed_out_percent"),
+        Column(key="spill", header="spill [% of cycles]", kind=Kind.MEAN, field="spill_percent"),
+        Column(key="hard_contact", header="hard contact [%]", kind=Kind.RATE, field="has_hard_contact"),
+        Column(
+            key="commonest_failure",
+            header="commonest failure",
+            kind=Kind.COUNTS,
+            field="commonest_failure",
+            words=(*FAILURES, NO_FAILURE),
+        ),
+    ),
+    compared=("pile_removed", "success"),
+    world="dug {soil} in version {simulation_version} of the simulation",
+    simulation="version {simulation_version}, {fidelity} fidelity of the soil",
+    legend=_legend,
+    outcome=clear_outcome,
+    summary=clear_summary,
+)
