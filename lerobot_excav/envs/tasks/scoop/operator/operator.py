@@ -1,15 +1,17 @@
 """The scripted operator: digs any target of any scene through the four joysticks."""
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
-from lerobot_excav.envs.machines.excavator.kinematics import forward
-from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
-from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG
-from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, JointMotion, joint_pos_near
-from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_cut, plan_dump, plan_lift
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, DigCycle
+from lerobot_excav.envs.tasks.scoop.operator.dig import plan_dig
+from lerobot_excav.envs.tasks.scoop.operator.motion import CarefulMotion, JointMotion
+from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_dump, plan_lift
+from lerobot_excav.envs.tasks.scoop.operator.reach import bucket_pose, joint_pos_near
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor, Variation, draw_variation
 
 PHASES = ("reach", "cut", "curl", "lift", "carry", "dump", "rest")
@@ -24,6 +26,22 @@ FULL_KG = 500.0
 """Payload at which the cut is broken off [kg]."""
 
 
+class DigView(Protocol):
+    """What the operator looks at; an `ExcavatorEnv` is one."""
+
+    @property
+    def worksite(self) -> Worksite:
+        """Machine, soil and box."""
+
+    @property
+    def cycle(self) -> DigCycle:
+        """The running cycle, with the commanded region."""
+
+    @property
+    def fps(self) -> int:
+        """Commands per second."""
+
+
 class DigOperator:
     """Digs the commanded target, issuing only joystick commands.
 
@@ -36,12 +54,12 @@ class DigOperator:
         self._rng = rng
         self._phase = len(PHASES) - 1
 
-    def reset(self, env: ExcavatorEnv) -> None:
+    def reset(self, env: DigView) -> None:
         """Begin the running cycle of an environment with a newly drawn style."""
         self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
         self._target_id = env.cycle.target_id
-        self._cut = plan_cut(env.worksite.soil, env.cycle.target, self._variation)
+        self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
         self._begin(0, env)
 
     @property
@@ -54,7 +72,7 @@ class DigOperator:
         """Whether the cycle is over and the operator rests."""
         return self.phase == "rest"
 
-    def act(self, env: ExcavatorEnv) -> NDArray[np.float32]:
+    def act(self, env: DigView) -> NDArray[np.float32]:
         """Return the joystick command for the next frame: swing, boom, arm, bucket in [-1, 1], (4,) float32."""
         if env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest"):
             self.reset(env)
@@ -73,21 +91,23 @@ class DigOperator:
         command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
         return np.asarray(command, dtype=np.float32)
 
-    def _begin(self, phase: int, env: ExcavatorEnv) -> None:
+    def _begin(self, phase: int, env: DigView) -> None:
         """Start a phase from where the machine is, after the style's pause."""
         self._phase = phase
         self._time_s = -self._variation.pauses_s[phase]
         if not self.done:
             joint_pos = env.worksite.machine.joint_pos
-            self._motion = JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
+            is_careful = self.phase == "cut" and self._dig.is_scrape
+            motion = CarefulMotion if is_careful else JointMotion
+            self._motion = motion(self._joint_path(joint_pos), speed=self._variation.speed)
 
     def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Plan the present phase's path from a joint position."""
-        present = _bucket_pose(joint_pos)
+        present = bucket_pose(joint_pos)
         if self.phase == "reach":
-            return list(np.linspace(joint_pos, joint_pos_near(self._cut[0]), 24))
+            return list(np.linspace(joint_pos, joint_pos_near(self._dig.poses[0]), 24))
         if self.phase == "cut":
-            return [joint_pos, *(joint_pos_near(pose) for pose in self._cut[1:])]
+            return [joint_pos, *(joint_pos_near(pose) for pose in self._dig.poses[1:])]
         plans = {
             "curl": lambda: plan_curl(present),
             "lift": lambda: plan_lift(present),
@@ -96,7 +116,7 @@ class DigOperator:
         }
         return [joint_pos, *(joint_pos_near(pose, keep="pin") for pose in plans[self.phase]()[1:])]
 
-    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: ExcavatorEnv) -> bool:
+    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: DigView) -> bool:
         if self.done:
             return False
         payload_kg = env.worksite.soil.payload_mass_kg
@@ -108,9 +128,3 @@ class DigOperator:
             return self._time_s > self._motion.duration_s + 3.0
         arrived = bool(np.max(np.abs(self._motion.end - joint_pos)) < ARRIVAL_TOLERANCE_RAD)
         return arrived or self._time_s > self._motion.duration_s + OVERTIME_S
-
-
-def _bucket_pose(joint_pos: NDArray[np.float64]) -> BucketPose:
-    edge_pos_w, pitch_rad = forward(joint_pos)
-    radius, _, height = cylinder_from_world(edge_pos_w)
-    return BucketPose(radius_m=radius, height_m=height, pitch_rad=pitch_rad, swing_rad=float(joint_pos[0]))

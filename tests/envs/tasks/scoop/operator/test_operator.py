@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
 
-from lerobot_excav.envs.machines.excavator.constants import JOINT_ACCEL_RAD_S2, JOINT_SPEED_RAD_S
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator import PHASES, DigOperator
-from lerobot_excav.envs.tasks.scoop.operator.path import JointMotion
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor
 
 
@@ -48,23 +46,6 @@ def test_same_generator_gives_the_same_demonstration_and_another_another_style(e
     first, again, other = (drive(env, scene_id=1, target_id=2, seed=seed)[0] for seed in (3, 3, 4))
     assert np.array_equal(first, again)
     assert first.shape != other.shape or not np.allclose(first, other)
-
-
-def test_joint_motion_keeps_to_speeds_and_ends_where_it_should():
-    path = np.array([[0.0, 0.1, -1.0, 0.0], [0.9, 0.5, -1.4, -0.8], [1.4, 0.2, -1.8, -1.0]])
-    motion = JointMotion(path, speed=0.9)
-    times = np.arange(0.0, motion.duration_s, 0.01)
-    velocity = np.array([motion.at(t)[1] for t in times])
-    assert np.all(np.abs(velocity) <= 0.9 * np.array(JOINT_SPEED_RAD_S) + 1e-6)
-    assert np.allclose(motion.at(motion.duration_s)[0], path[-1], atol=1e-9)
-    assert np.allclose(motion.at(0.0)[0], path[0], atol=1e-9)
-
-
-@pytest.mark.parametrize("distance_rad", [0.02, 0.5, 3.0])
-def test_joint_motion_starts_within_the_machines_acceleration(distance_rad):
-    motion = JointMotion([np.zeros(4), np.array([distance_rad, 0.0, 0.0, 0.0])], speed=1.0)
-    velocity = np.array([motion.at(t)[1] for t in np.arange(0.0, motion.duration_s, 0.02)])[:, 0]
-    assert np.abs(np.diff(velocity)).max() / 0.02 <= JOINT_ACCEL_RAD_S2[0]
 
 
 def test_tremor_has_the_size_it_is_given():

@@ -6,8 +6,11 @@ import pytest
 from lerobot_excav.envs.machines.excavator import layout
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_from_world, world_from_cylinder
 from lerobot_excav.envs.soil import Soil
-from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, UnreachableError, joint_pos_near, line
-from lerobot_excav.envs.tasks.scoop.operator.plan import FLOOR_CLEARANCE_M, plan_carry, plan_cut, plan_dump
+from lerobot_excav.envs.tasks.scoop.operator.cut import FLOOR_CLEARANCE_M
+from lerobot_excav.envs.tasks.scoop.operator.dig import plan_dig
+from lerobot_excav.envs.tasks.scoop.operator.path import BucketPose, line
+from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_dump
+from lerobot_excav.envs.tasks.scoop.operator.reach import joint_pos_near
 from lerobot_excav.envs.tasks.scoop.operator.variation import draw_variation
 from lerobot_excav.envs.tasks.scoop.scene import SOIL_CELL_SIZE_M, draw_scene
 from lerobot_excav.envs.tasks.scoop.targets import Target
@@ -40,7 +43,7 @@ def test_cylinder_coordinates_round_trip():
 def test_cut_enters_inside_the_patch_goes_towards_the_machine_rolls_in_and_leaves_the_floor(scene, soil, target_id):
     target = scene.targets[target_id]
     for variation in VARIATIONS:
-        cut = plan_cut(soil, target, variation)
+        cut = plan_dig(soil, target, variation).poses
         points_w = np.array([[*world_from_cylinder(p.radius_m, p.swing_rad), p.height_m] for p in cut])
         below = points_w[:, 2] < soil.height_at(points_w[:, :2])
         first = int(np.argmax(below))
@@ -56,7 +59,7 @@ def test_deeper_style_cuts_deeper_where_there_is_soil():
     soil.reset(np.ones_like(soil.heights_m))
     target, style = Target(center_w=np.array([0.5, 0.0, 1.0]), yaw_rad=0.0), VARIATIONS[0]
     depths = [0.3, 0.4]
-    cuts = [plan_cut(soil, target, dataclasses.replace(style, depth_m=depth)) for depth in depths]
+    cuts = [plan_dig(soil, target, dataclasses.replace(style, depth_m=depth)).poses for depth in depths]
     lowest = [min(pose.height_m for pose in cut) for cut in cuts]
     assert lowest == pytest.approx([0.7, 0.6])
 
@@ -81,8 +84,3 @@ def test_line_starts_and_ends_at_its_ends(about_pin):
     poses = line(a, b, about_pin=about_pin)
     for pose, end in ((poses[0], a), (poses[-1], b)):
         assert dataclasses.astuple(pose) == pytest.approx(dataclasses.astuple(end))
-
-
-def test_point_out_of_reach_is_named():
-    with pytest.raises(UnreachableError, match=r"radius_m=12\.0"):
-        joint_pos_near(BucketPose(radius_m=12.0, height_m=1.0, pitch_rad=-1.5, swing_rad=0.0))
