@@ -148,7 +148,10 @@ def clear_summary(index: "pd.DataFrame") -> str:
 
 
 def _legend(operator: str | None) -> list[str]:
-    lines = ["Shares of cycles are averaged over piles, each with the same weight."]
+    lines = [
+        "Shares of cycles are averaged over piles, each with the same weight.",
+        f"Commonest failure: piles with {' / '.join((*FAILURES, NO_FAILURE))}.",
+    ]
     if operator is None:
         return lines
     return [*lines, f"Efficiency: pile removed over the operator's on the same scenes; operator: {operator}."]

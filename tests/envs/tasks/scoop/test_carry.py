@@ -62,7 +62,7 @@ def played(*, opens):
     is_over, open_frames = False, 30 if opens else 0
     while not is_over:
         action = operator.act(env)
-        if open_frames and operator.phase == "carry" and env.agent_pos[0] > 0.5:
+        if open_frames and operator.phase == "carry":
             action, open_frames = np.array([0.0, 0.0, 0.0, 1.0], np.float32), open_frames - 1
         _, _, terminated, truncated, _ = env.step(action)
         is_over = terminated or truncated
@@ -71,7 +71,7 @@ def played(*, opens):
 
 @pytest.mark.parametrize("opens", [False, True])
 def test_a_cycle_that_opens_the_bucket_on_the_way_spills_and_a_good_one_does_not(opens):
-    assert played(opens=opens).spill_before_target_events == int(opens)
+    assert (played(opens=opens).spill_before_target_events > 0) == opens
 
 
 def test_clearance_is_that_of_the_lowest_point():

@@ -29,7 +29,8 @@ def real_worksite():
 @pytest.fixture
 def site(real_worksite):
     """A machine at rest over the pile, and soil and box as a test wants them."""
-    soil = SimpleNamespace(payload_mass_kg=0.0, box_mass_kg=0.0, **parcels())
+    flat = {"height_at": lambda xy_w: np.zeros(len(xy_w))}
+    soil = SimpleNamespace(payload_mass_kg=0.0, box_mass_kg=0.0, **flat, **parcels())
     return SimpleNamespace(machine=real_worksite.machine, soil=soil)
 
 
@@ -47,6 +48,18 @@ def play(cycle, ticks):
     for _ in range(ticks):
         cycle.update()
     return cycle.is_complete
+
+
+def test_a_load_that_the_cycle_before_left_in_the_bucket_is_not_loaded_now(site):
+    site.soil.payload_mass_kg = 80.0
+    cycle = DigCycle(site, draw_scene("train", 0), target_id=0)
+    cycle.update()
+    assert cycle.target_hit is None
+    for payload_kg in (5.0, 80.0):
+        site.soil.payload_mass_kg = payload_kg
+        cycle.update()
+    assert cycle.target_hit is not None
+    assert np.array_equal(cycle.onset_w, site.machine.cutting_edge_pos_w)
 
 
 def test_a_cycle_is_complete_once_the_bucket_has_stayed_empty(cycle):
