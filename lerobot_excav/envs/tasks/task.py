@@ -61,6 +61,7 @@ class TaskSpec:
         task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
         target_count: Targets of a scene.
+        last_stage: How many cycles a seeded operator may have dug before the start; 0 if scenes have no stages.
     """
 
     id: str
@@ -85,6 +86,7 @@ class TaskSpec:
     task_state_tolerance: float
     judges_at_the_end: bool
     target_count: int = TARGETS_PER_SCENE
+    last_stage: int = 0
 
     @property
     def env_type(self) -> str:
