@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.excavator.constants import TICK_S
+from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import SoilParameters
@@ -100,7 +101,7 @@ def dig_cycle(worksite: Worksite, scene: Scene, operator: DigOperator) -> DigCyc
     view = _View(worksite=worksite, cycle=cycle)
     operator.reset(view)
     for _ in range(round(CYCLE_LIMIT_S * _FPS)):
-        action = operator.act(view)
+        action = checked_action(operator.act(view))
         for _ in range(_TICKS_PER_FRAME):
             worksite.tick(action)
             cycle.update()
