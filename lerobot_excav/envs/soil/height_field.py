@@ -131,27 +131,33 @@ class HeightField:
         steps = np.arange(self.heights.shape[axis], dtype=np.float64)
         return np.asarray(self.grid.first_m[axis] + steps * self.grid.cell_m[axis])
 
-    def reset(self, heights_m: ArrayLike | None) -> None:
+    def reset(self, heights_m: ArrayLike | None, firm_heights_m: ArrayLike | None = None) -> None:
         """Replace all heights, byte for byte; zero if none are given.
 
+        What lies above `firm_heights_m` has been loosened before; by default nothing has.
+
         Raises:
-            ConfigurationError: The shape is wrong, or a height is negative or not finite.
+            ConfigurationError: A shape is wrong, or a height is negative or not finite.
         """
-        shape = self.heights.shape
-        new = np.zeros(shape) if heights_m is None else np.asarray(heights_m, dtype=np.float64)
-        require(new.shape == shape, f"heights_m has shape {new.shape}; allowed: {shape}, one height per cell.")
-        finite, above = bool(np.isfinite(new).all()), bool((new >= 0).all())
-        require(finite, "heights_m holds values that are not finite; give metres above the floor.")
-        require(above, f"heights_m goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.")
+        new = np.zeros(self.heights.shape) if heights_m is None else self._checked("heights_m", heights_m)
+        firm = new if firm_heights_m is None else self._checked("firm_heights_m", firm_heights_m)
         self.heights[:] = new
         self.layer.bed[:] = new
-        self.layer.firm[:] = new
+        self.layer.firm[:] = np.minimum(firm, new)
         self.layer.speeds[:] = 0.0
         self.layer.flux[:] = 0.0
         self.layer.crept_s[:] = 0.0
         self.active[:] = 1
         self.ceiling[:] = np.inf
         self._at_rest = False
+
+    def _checked(self, name: str, heights_m: ArrayLike) -> Array:
+        """Return heights (nx, ny) [m] as an array, after checking them."""
+        shape, new = self.heights.shape, np.asarray(heights_m, dtype=np.float64)
+        require(new.shape == shape, f"{name} has shape {new.shape}; allowed: {shape}, one height per cell.")
+        require(bool(np.isfinite(new).all()), f"{name} holds values that are not finite; give metres above the floor.")
+        require(bool((new >= 0).all()), f"{name} goes down to {new.min():.4g} m; allowed: 0 and above the rigid floor.")
+        return new
 
     def sample(self, points: Array) -> Array:
         """Return the bilinear height [m] at (n, 2) points of the field's plane."""

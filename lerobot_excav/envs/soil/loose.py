@@ -130,6 +130,14 @@ class LooseSoil:
         self.population.step(tool, site, dt_s, cutting=cutting)
         return self._merge(self.population.settle(site, dt_s))
 
+    def lay_down(self) -> float:
+        """Turn all parcels into ground, each on what is below it; return the mass [kg] that landed out of bounds."""
+        state = self.population.state
+        points, masses = np.ascontiguousarray(state.positions[:, :2]), state.masses.copy()
+        landed = Landed(points_w=points, masses_kg=masses, place=places_below(self._site(), points))
+        self.population.clear()
+        return self._merge(landed)
+
     def weighed_heights(self) -> Array:
         """Return (nx, ny) heights of the dig area [m] with the parcels outside of the bucket put on their columns."""
         state, field = self.population.state, self._field

@@ -89,16 +89,29 @@ class Soil:
         self._resistance = SoilResistance(self.parameters, self.fidelity.force_slices)
         self.reset()
 
-    def reset(self, heights_m: ArrayLike | None = None) -> None:
-        """Put new soil in the dig area and remove it everywhere else: box, bucket, air, out of bounds.
+    def reset(
+        self,
+        heights_m: ArrayLike | None = None,
+        *,
+        firm_heights_m: ArrayLike | None = None,
+        container_heights_m: ArrayLike | None = None,
+    ) -> None:
+        """Put new soil in dig area and box, and remove it everywhere else: bucket, air, out of bounds.
 
-        Heights (nx, ny) count from the rigid floor and are kept byte for byte; None makes an empty floor.
+        All heights count from the rigid floor and are kept byte for byte.
+
+        Args:
+            heights_m: Soil in the dig area, (nx, ny); None makes an empty floor.
+            firm_heights_m: How high soil lies there that was never loosened, (nx, ny); None means all of it.
+            container_heights_m: Soil in the target box, (mx, my), all of it loosened; None makes an empty box.
 
         Raises:
-            ConfigurationError: The shape is wrong, or a height is negative or not finite.
+            ConfigurationError: A shape is wrong, a height is negative or not finite, or there is no box to fill.
         """
-        self._field.reset(heights_m)
-        self._box_field.reset(None)
+        boxed = container_heights_m is not None
+        require(not boxed or self.container is not None, "container_heights_m is given, and there is no container.")
+        self._field.reset(heights_m, firm_heights_m)
+        self._box_field.reset(container_heights_m, np.zeros(self._box_field.heights.shape))
         self._loose.clear()
         self._bucket.clear()
         self._resistance.forget()
@@ -128,6 +141,15 @@ class Soil:
         masses = np.full(len(positions), self.parcel_mass_kg)
         self._out_of_bounds_kg += self._loose.add(positions, velocities, masses, apart=True)
         self._load_kg, _ = self._weighed_load(None)  # one may have joined the load
+
+    def lay_down(self) -> None:
+        """Turn all loose soil into ground at once, the load of the bucket included, each part on what is below it.
+
+        It may lie too steep: later steps let it avalanche.
+        """
+        self._give_birth(is_last=True)
+        self._out_of_bounds_kg += self._loose.lay_down()
+        self._load_kg, _ = self._weighed_load(None)
 
     def step(self, dt_s: float = TICK_S, tool: Tool | None = None) -> Reaction:
         """Advance by one step.
@@ -194,6 +216,11 @@ class Soil:
     def heights_m(self) -> Array:
         """(nx, ny) heights above the rigid floor [m], x first: a read-only view that later steps change."""
         return _read_only(self._field.heights)
+
+    @property
+    def firm_heights_m(self) -> Array:
+        """(nx, ny) how high soil lies that was never loosened [m]: a read-only view that later steps change."""
+        return _read_only(self._field.layer.firm)
 
     @property
     def container_heights_m(self) -> Array | None:

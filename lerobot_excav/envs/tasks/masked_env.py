@@ -37,8 +37,9 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     The rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
 
     `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`; `reset(options={"scene_id": …, "target_id": …,
-    "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, or the task's default,
-    and without `commands` the task decides whether the command changes. A reset with nothing draws a scene.
+    "stage": …, "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, or the
+    task's default, without a stage the scene is as it was drawn, and without `commands` the task decides whether the
+    command changes. A reset with nothing draws a scene.
 
     Where the mask source finds nothing, the machine is held still until it does: `reset` and `step` pass as many frames
     as that takes, and `mask_missing_frames` counts them. After `MASK_MISSING_LIMIT_S` the episode is given up:
@@ -214,6 +215,11 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         return self._require_episode().scene_id
 
     @property
+    def stage(self) -> int:
+        """Cycles that a seeded operator had dug before the start of the running episode."""
+        return self._require_episode().stage
+
+    @property
     def target_id(self) -> int:
         """Index of the target that is commanded now."""
         return self.command.target_id
@@ -231,10 +237,12 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         """
         super().reset(seed=seed)
         spec = self.task_spec
-        count, default, length = spec.target_count, spec.default_target, self.episode_length
-        selection = select_episode(
-            seed, options or {}, rng=self.np_random, target_count=count, length=length, default_target=default
-        )
+        limits = {
+            "target_count": spec.target_count,
+            "default_target": spec.default_target,
+            "last_stage": spec.last_stage,
+        }
+        selection = select_episode(seed, options or {}, rng=self.np_random, length=self.episode_length, **limits)
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0

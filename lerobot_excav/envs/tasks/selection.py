@@ -8,7 +8,7 @@ import numpy as np
 
 from lerobot_excav.errors import require, require_choice, require_integer
 
-RESET_OPTIONS = ("scene_id", "target_id", "commands")
+RESET_OPTIONS = ("scene_id", "target_id", "stage", "commands")
 
 Schedule = tuple[tuple[int, int], ...]
 """Changes of the command: after how many actions which target is commanded."""
@@ -19,6 +19,7 @@ class Selection:
     """What an episode plays."""
 
     scene_id: int  # scene
+    stage: int = 0  # cycles that a seeded operator has dug before the start
     target_id: int  # target that is commanded at the start
     schedule: Schedule | None = None  # changes of the command; None leaves them to the task
 
@@ -31,13 +32,14 @@ def select_episode(
     target_count: int,
     length: int,
     default_target: int | None = None,
+    last_stage: int = 0,
 ) -> Selection:
     """Choose scene, target and changes of the command.
 
     Without options the scene is the seed, or drawn if there is none, and its remainder the target, unless the task has
-    a default of its own. Options may hold
-    `scene_id`, `target_id` and `commands` (changes of the command, as pairs of the number of actions carried out before
-    and the target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
+    a default of its own. Options may hold `scene_id`, `target_id`, `stage` (cycles dug before the start, at most
+    `last_stage`) and `commands` (changes of the command, as pairs of the number of actions carried out before and the
+    target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
 
     Raises:
         ConfigurationError: A value is not a whole number or out of range, or an option is unknown.
@@ -50,9 +52,11 @@ def select_episode(
     require_integer("scene_id", scene_id, 0, 2**63 - 1)
     target_id = options.get("target_id", scene_id % target_count if default_target is None else default_target)
     require_integer("target_id", target_id, 0, target_count - 1)
+    stage = options.get("stage", 0)
+    require_integer("stage", stage, 0, last_stage, hint="" if last_stage else "Scenes of this task have no stages.")
     commands = options.get("commands")
     schedule = None if commands is None else checked_schedule(commands, target_count, length)
-    return Selection(scene_id=int(scene_id), target_id=int(target_id), schedule=schedule)
+    return Selection(scene_id=int(scene_id), stage=int(stage), target_id=int(target_id), schedule=schedule)
 
 
 def checked_schedule(commands: Sequence[Sequence[int]], target_count: int, length: int) -> Schedule:

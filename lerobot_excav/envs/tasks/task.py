@@ -63,6 +63,7 @@ class TaskSpec:
         target_count: Targets of a scene.
         default_target: Target that is commanded first unless options of `reset` say otherwise; None if a scene is shown
             with all of them in turn.
+        last_stage: How many cycles a seeded operator may have dug before the start; 0 if scenes have no stages.
     """
 
     id: str
@@ -88,6 +89,7 @@ class TaskSpec:
     judges_at_the_end: bool
     target_count: int = TARGETS_PER_SCENE
     default_target: int | None = None
+    last_stage: int = 0
 
     @property
     def env_type(self) -> str:

@@ -47,6 +47,29 @@ def test_reset_empties_everything_else():
     assert soil.mechanical_energy_j() == 0.0
 
 
+@pytest.mark.parametrize("preset", ["sand", "dirt"])
+def test_soil_laid_down_and_put_back_by_its_heights_weighs_the_same(preset):
+    soil = dug(260, preset, container=TARGET_BOX)
+    soil.add_parcels([[-3.75, 4.75, 0.5], [0.0, 0.0, 3.0]], np.zeros((2, 3)))
+    before = soil.ledger_kg()
+    assert before["bucket"] > 0.0
+    soil.lay_down()
+    down = soil.ledger_kg()
+    assert down["bucket"] == down["parcels"] == 0.0
+    assert down["box"] == pytest.approx(soil.parcel_mass_kg)
+    assert sum(down.values()) == pytest.approx(sum(before.values()), abs=1e-6)
+    heights, firm, boxed = (np.array(a) for a in (soil.heights_m, soil.firm_heights_m, soil.container_heights_m))
+    soil.reset(heights, firm_heights_m=firm, container_heights_m=boxed)
+    again = soil.ledger_kg()
+    assert (again["grid"], again["box"]) == (down["grid"], down["box"])
+    assert np.array_equal(soil.container_heights_m, boxed)
+
+
+def test_soil_for_a_box_that_is_not_there_is_refused():
+    with pytest.raises(ConfigurationError, match="container_heights_m"):
+        Soil().reset(container_heights_m=np.zeros((1, 1)))
+
+
 def test_the_same_seed_and_motion_give_the_same_bits_also_after_a_reset():
     """Over the whole cycle: dig, carry asleep, dump, land in the box."""
     runs = []

@@ -46,7 +46,8 @@ def test_numpy_integers_become_pythons_own():
         ({"scene_id": 2**63}, "scene_id=9223372036854775808"),
         ({"target_id": True}, "target_id=True"),
         ({"target_id": 4}, "target_id=4 .*from 0 to 3"),
-        ({"scene": 3}, "options='scene' .*'scene_id', 'target_id', 'commands'"),
+        ({"scene": 3}, "options='scene' .*'scene_id', 'target_id', 'stage', 'commands'"),
+        ({"stage": 1}, "stage=1 .*no stages"),
         ({"commands": [(0, 1)]}, "commands: frame=0 .*from 1 to 399"),
         ({"commands": [(4, 1), (4, 2)]}, "commands: frame=4 .*from 5 to 399"),
         ({"commands": [(400, 1)]}, "commands: frame=400 .*from 1 to 399"),
@@ -60,3 +61,15 @@ def test_numpy_integers_become_pythons_own():
 def test_unusable_options_are_refused(options, named):
     with pytest.raises(ConfigurationError, match=named):
         select(**options)
+
+
+def test_stages_go_as_far_as_the_task_has_any():
+    def stage_of(options, last_stage):
+        rng = np.random.default_rng(0)
+        limits = {"target_count": 4, "length": 400, "last_stage": last_stage}
+        return select_episode(0, options, rng=rng, **limits).stage
+
+    assert stage_of({}, 15) == stage_of({"stage": 0}, 0) == 0
+    assert stage_of({"stage": np.int64(15)}, 15) == 15
+    with pytest.raises(ConfigurationError, match=r"stage=16 .*from 0 to 15"):
+        stage_of({"stage": 16}, 15)

@@ -20,11 +20,15 @@ class WorksiteStart:
         joint_pos: Swing, boom, arm, bucket [rad], shape (4,).
         heights_m: Soil above the floor [m], shape (nx, ny).
         appearance: Colours and light.
+        firm_heights_m: How high soil lies that was never loosened [m], shape (nx, ny); None means all of it.
+        box_heights_m: Soil in the target box [m], shape (mx, my); None means that it is empty.
     """
 
     joint_pos: NDArray[np.float64]
     heights_m: NDArray[np.float64]
     appearance: Appearance
+    firm_heights_m: NDArray[np.float64] | None = None
+    box_heights_m: NDArray[np.float64] | None = None
 
 
 class Worksite:
@@ -56,7 +60,7 @@ class Worksite:
         """Start again, exactly."""
         self.machine.set_appearance(start.appearance)
         self.machine.reset(start.joint_pos)
-        self.soil.reset(start.heights_m)
+        self.soil.reset(start.heights_m, firm_heights_m=start.firm_heights_m, container_heights_m=start.box_heights_m)
         self.start_heights_m = start.heights_m
         self._ticks = 0
 

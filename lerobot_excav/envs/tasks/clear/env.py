@@ -15,7 +15,8 @@ from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
 from lerobot_excav.envs.tasks.clear.surface import SeenSurface, see_surface
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.envs.tasks.scoop.scene import Scene
+from lerobot_excav.envs.tasks.scoop.stage import draw_start
 from lerobot_excav.errors import require
 
 PLANNER_PICTURE_PX = (192, 256)
@@ -67,7 +68,10 @@ class ClearEnv(ExcavatorEnv):
 
     @override
     def _start(self, scene_id: int, target_id: int) -> None:
-        self._scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)
+        settings = self._excavator_settings
+        self._scene = draw_start(
+            settings.scene_set, scene_id, self.stage, soil=settings.soil, fidelity=settings.fidelity
+        )
         self.worksite.reset(self._scene)
         self._clearing = Clearing(self.worksite)
         self._look()

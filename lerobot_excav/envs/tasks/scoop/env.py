@@ -15,8 +15,9 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
-from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
+from lerobot_excav.envs.tasks.scoop.stage import draw_start
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
@@ -29,7 +30,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     Task (`Scoop-v0`): one dig-load-dump cycle on the region that the target mask shows.
 
     Scene and randomisation: pile shape and mass, colours, light, initial joint angles and the four targets come from
-    `scene_set` and the scene's number.
+    `scene_set` and the scene's number. At a later `stage` (an option of `reset`) a seeded operator has dug that many
+    cycles before: the pile is what it left, the box holds what it brought, the machine stands where it dumped.
 
     Observation:
 
@@ -110,7 +112,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         return self.cycle.failure or ("not emptied in time" if self.is_over and not self.is_success else None)
 
     def _start(self, scene_id: int, target_id: int) -> None:
-        scene = draw_scene(self.settings.scene_set, scene_id, soil=self._excavator_settings.soil)
+        settings = self._excavator_settings
+        scene = draw_start(settings.scene_set, scene_id, self.stage, soil=settings.soil, fidelity=settings.fidelity)
         self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
 

@@ -52,4 +52,5 @@ SCOOP = TaskSpec(
     measures_entry="lerobot_excav.envs.tasks.scoop.measures:SCOOP_MEASURES",
     task_state_tolerance=1e-2,  # [kg], [m], or a count (kind: guess; the same build repeats exactly)
     judges_at_the_end=False,
+    last_stage=15,
 )

@@ -51,6 +51,28 @@ def test_reset_restores_the_soil_exactly_after_anything(env):
     assert env.worksite.soil.ledger_kg()["box"] == 0.0
 
 
+def test_two_resets_to_a_later_stage_are_the_same_and_the_regions_of_one_start_share_its_soil():
+    env = ExcavatorEnv(obs_type="agent_pos", scene_set="val", fidelity="fast")
+
+    def started(**options):
+        observation, _ = env.reset(options={"scene_id": 3, "stage": 1, **options})
+        soil = env.worksite.soil
+        state = soil.heights_m.tobytes(), soil.container_heights_m.tobytes(), observation["agent_pos"].tobytes()
+        return state, env.target.center_w.tobytes()
+
+    first, region = started(target_id=0)
+    rollout(env, np.array([-1.0, -1.0, 0.3, 0.5]), 20)
+    assert started(target_id=0) == (first, region)
+    again, other_region = started(target_id=1)
+    assert again == first
+    assert other_region != region
+    assert env.stage == 1
+    assert env.worksite.soil.box_mass_kg > 200.0
+    env.reset(options={"scene_id": 3})
+    assert env.stage == 0
+    assert env.worksite.soil.box_mass_kg == 0.0
+
+
 def test_actions_beyond_full_stick_are_clipped(env):
     env.reset(seed=1)
     clipped = rollout(env, np.array([1.0, 1.0, -1.0, 0.0]), 5)[0]["agent_pos"]

@@ -12,7 +12,7 @@ from lerobot_excav.envs.tasks.scoop.operator.variation import Variation
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
 # (kind: tuned on train scenes)
-THIN_SOIL_M = 0.22
+THIN_SOIL_M = 0.13
 """Mean height of the soil below which it is scraped [m]."""
 LOOK_LENGTH_M = 1.5
 """Over which it is looked at, from the entry towards the machine [m]: about what a cut takes."""

@@ -58,7 +58,7 @@ def test_any_region_of_any_pile_is_dug_and_curled_within_reach(seed, thickness_m
         assert min(lowest_m) > -1e-3, "the shell would be in the rigid floor"
 
 
-@pytest.mark.parametrize("thickness_m", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("thickness_m", [0.04, 0.08, 0.12])
 def test_thin_soil_is_scraped_along_the_floor_with_the_belly_off_it(thickness_m):
     on_floor = [pose for pose in scraped(thickness_m) if pose.pitch_rad > -2.3][8:]
     assert len(on_floor) > 10

@@ -1,0 +1,132 @@
+"""Starts by stage: what a scene is like when a seeded operator has dug some cycles of it.
+
+A start is (scene set, scene, stage), and a stage is one cycle more than the one before. Between two cycles all loose
+soil is laid down, so that a start is nothing but heights and a pose: it can be kept, and begun from exactly.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.constants import TICKS_PER_SECOND
+from lerobot_excav.envs.machines.excavator.constants import TICK_S
+from lerobot_excav.envs.machines.excavator.control import checked_action
+from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
+from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.soil import SoilParameters
+from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
+from lerobot_excav.envs.tasks.scoop.operator import DigOperator
+from lerobot_excav.envs.tasks.scoop.regions import propose_most_soil
+from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.envs.tasks.scoop.targets import Target
+from lerobot_excav.envs.tasks.settings import SCENE_SETS
+
+Propose = Callable[[Worksite], Sequence[Target]]
+"""Says which regions of a worksite to dig next, the best first: as many as a scene has."""
+
+CYCLE_LIMIT_S = 25.0
+"""When a cycle of the operator is given up [s]: late ones take 20 s (kind: tuned)."""
+
+_FPS = 10
+_TICKS_PER_FRAME = TICKS_PER_SECOND // _FPS
+# Names the family of the operators' random streams; changing it changes every start but those of stage 0.
+_STREAM = 0x57A6E
+_SETTLING_TICKS = round(10.0 / TICK_S)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _View:
+    """What the operator looks at."""
+
+    worksite: Worksite
+    cycle: DigCycle
+    fps: int = _FPS
+
+
+def draw_start(
+    scene_set: str,
+    scene_id: int,
+    stage: int,
+    *,
+    soil: str | SoilParameters = "sand",
+    fidelity: str = "standard",
+    propose: Propose = propose_most_soil,
+) -> Scene:
+    """Return the scene as it is after `stage` cycles, with the regions that are proposed then; memoised.
+
+    Stage 0 is the scene as drawn, with its own targets. The same arguments give the same start, byte for byte.
+
+    Raises:
+        ConfigurationError: An argument is not one of the allowed values.
+    """
+    if stage == 0:
+        return draw_scene(scene_set, scene_id, soil=soil)
+    return _later_start(scene_set, scene_id, stage, soil, fidelity, propose)
+
+
+@lru_cache(maxsize=64)
+def _later_start(
+    scene_set: str, scene_id: int, stage: int, soil: str | SoilParameters, fidelity: str, propose: Propose
+) -> Scene:
+    before = draw_start(scene_set, scene_id, stage - 1, soil=soil, fidelity=fidelity, propose=propose)
+    rehearse()
+    worksite = Worksite(soil=soil, fidelity=fidelity)
+    worksite.reset(before)
+    target = before.targets[0] if stage > 1 else propose(worksite)[0]
+    operator = DigOperator(rng=operator_rng(scene_set, scene_id, stage))
+    dig_cycle(worksite, replace(before, targets=(target,)), operator)
+    settle(worksite)
+    return replace(
+        before,
+        joint_pos=_kept(worksite.machine.joint_pos),
+        heights_m=_kept(worksite.soil.heights_m),
+        firm_heights_m=_kept(worksite.soil.firm_heights_m),
+        box_heights_m=_kept(worksite.soil.container_heights_m),
+        targets=tuple(propose(worksite)),
+    )
+
+
+def operator_rng(scene_set: str, scene_id: int, stage: int) -> np.random.Generator:
+    """Return the generator of the operator whose cycle leads to a stage."""
+    stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id, stage))
+    return np.random.default_rng(stream)
+
+
+def dig_cycle(worksite: Worksite, scene: Scene, operator: DigOperator) -> DigCycle:
+    """Let the operator dig the first target of a scene, as it is now, until the cycle is complete or given up."""
+    cycle = DigCycle(worksite, scene, 0)
+    view = _View(worksite=worksite, cycle=cycle)
+    operator.reset(view)
+    for _ in range(round(CYCLE_LIMIT_S * _FPS)):
+        action = checked_action(operator.act(view))
+        for _ in range(_TICKS_PER_FRAME):
+            worksite.tick(action)
+            cycle.update()
+        if cycle.is_complete:
+            break
+    return cycle
+
+
+def settle(worksite: Worksite) -> None:
+    """Hold the machine until it stands, lay down all loose soil, that in the bucket too, and wait until it lies still.
+
+    A slope at its very limit may creep on by less than can be seen; it is waited for no longer than 10 s.
+    """
+    for _ in range(TICKS_PER_SECOND):
+        worksite.tick(np.zeros(4, dtype=np.float64))
+    soil = worksite.soil
+    soil.lay_down()
+    for _ in range(_SETTLING_TICKS):
+        heights_m = soil.heights_m.copy()
+        soil.step(TICK_S, None)
+        if np.array_equal(heights_m, soil.heights_m):
+            return
+
+
+def _kept(array: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    copy = np.array(array)
+    copy.flags.writeable = False
+    return copy
