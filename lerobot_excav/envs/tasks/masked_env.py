@@ -236,13 +236,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             ConfigurationError: An option is unknown or has a value that is not possible.
         """
         super().reset(seed=seed)
-        spec = self.task_spec
-        limits = {
-            "target_count": spec.target_count,
-            "default_target": spec.default_target,
-            "last_stage": spec.last_stage,
-        }
-        selection = select_episode(seed, options or {}, rng=self.np_random, length=self.episode_length, **limits)
+        rng, length = self.np_random, self.episode_length
+        selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
         self._selection = selection
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0

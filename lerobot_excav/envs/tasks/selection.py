@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import require, require_choice, require_integer
 
 RESET_OPTIONS = ("scene_id", "target_id", "stage", "commands")
@@ -29,16 +30,13 @@ def select_episode(
     options: Mapping[str, Any],
     *,
     rng: np.random.Generator,
-    target_count: int,
+    task: TaskSpec,
     length: int,
-    default_target: int | None = None,
-    last_stage: int = 0,
 ) -> Selection:
     """Choose scene, target and changes of the command.
 
     Without options the scene is the seed, or drawn if there is none, and its remainder the target, unless the task has
-    a default of its own. Options may hold `scene_id`, `target_id`, `stage` (cycles dug before the start, at most
-    `last_stage`) and `commands` (changes of the command, as pairs of the number of actions carried out before and the
+    a default of its own. Options may hold `scene_id`, `target_id`, `stage` (cycles dug before the start) and `commands` (changes of the command, as pairs of the number of actions carried out before and the
     target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
 
     Raises:
@@ -50,12 +48,14 @@ def select_episode(
     number = int(rng.integers(2**31)) if seed is None else seed
     scene_id = options.get("scene_id", number)
     require_integer("scene_id", scene_id, 0, 2**63 - 1)
-    target_id = options.get("target_id", scene_id % target_count if default_target is None else default_target)
-    require_integer("target_id", target_id, 0, target_count - 1)
+    default = scene_id % task.target_count if task.default_target is None else task.default_target
+    target_id = options.get("target_id", default)
+    require_integer("target_id", target_id, 0, task.target_count - 1)
     stage = options.get("stage", 0)
-    require_integer("stage", stage, 0, last_stage, hint="" if last_stage else "Scenes of this task have no stages.")
+    hint = "" if task.last_stage else "Scenes of this task have no stages."
+    require_integer("stage", stage, 0, task.last_stage, hint=hint)
     commands = options.get("commands")
-    schedule = None if commands is None else checked_schedule(commands, target_count, length)
+    schedule = None if commands is None else checked_schedule(commands, task.target_count, length)
     return Selection(scene_id=int(scene_id), stage=int(stage), target_id=int(target_id), schedule=schedule)
 
 

@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.selection import select_episode
 from lerobot_excav.errors import ConfigurationError
 
 
 def select(seed=None, rng_seed=0, targets=4, **options):
     rng = np.random.default_rng(rng_seed)
-    chosen = select_episode(seed, options, rng=rng, target_count=targets, length=400)
+    chosen = select_episode(seed, options, rng=rng, task=replace(GRASP, target_count=targets), length=400)
     return chosen.scene_id, chosen.target_id, chosen.schedule
 
 
@@ -66,8 +69,7 @@ def test_unusable_options_are_refused(options, named):
 def test_stages_go_as_far_as_the_task_has_any():
     def stage_of(options, last_stage):
         rng = np.random.default_rng(0)
-        limits = {"target_count": 4, "length": 400, "last_stage": last_stage}
-        return select_episode(0, options, rng=rng, **limits).stage
+        return select_episode(0, options, rng=rng, task=replace(GRASP, last_stage=last_stage), length=400).stage
 
     assert stage_of({}, 15) == stage_of({"stage": 0}, 0) == 0
     assert stage_of({"stage": np.int64(15)}, 15) == 15
