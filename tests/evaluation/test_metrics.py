@@ -113,7 +113,7 @@ def test_a_line_that_cannot_be_used_is_named(metrics_file, scoop_line, changes, 
 
 
 def test_an_unknown_task_is_refused_with_those_that_are_known(metrics_file, scoop_line):
-    with pytest.raises(DatasetError, match=r"m\.jsonl:1: task='Dance-v0' .* 'Scoop-v0', 'FR5Grasp-v0'"):
+    with pytest.raises(DatasetError, match=r"m\.jsonl:1: task='Dance-v0' .* 'Scoop-v0', 'Clear-v0', 'FR5Grasp-v0'"):
         read_evaluation(metrics_file("m.jsonl", [scoop_line(1, task="Dance-v0")]))
 
 
@@ -158,7 +158,7 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
         ({"episode_length": 100}, "time limits: 100 and 200"),
         ({"soil": "gravel"}, "soils: gravel and sand"),
         ({"fidelity": "fine"}, "fidelities: fine and standard"),
-        ({"simulation_version": 1}, "versions of the simulation: 1 and 3"),
+        ({"simulation_version": 1}, "versions of the simulation: 1 and 4"),
     ],
 )
 def test_a_run_does_not_mix_conditions(make_run, scoop_line, changes, message):
