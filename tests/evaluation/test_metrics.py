@@ -113,7 +113,7 @@ def test_a_line_that_cannot_be_used_is_named(metrics_file, scoop_line, changes, 
 
 
 def test_an_unknown_task_is_refused_with_those_that_are_known(metrics_file, scoop_line):
-    with pytest.raises(DatasetError, match=r"m\.jsonl:1: task='Dance-v0' .* 'Scoop-v0', 'FR5Grasp-v0'"):
+    with pytest.raises(DatasetError, match=r"m\.jsonl:1: task='Dance-v0' .* 'Scoop-v0', 'Clear-v0', 'FR5Grasp-v0'"):
         read_evaluation(metrics_file("m.jsonl", [scoop_line(1, task="Dance-v0")]))
 
 
