@@ -66,10 +66,10 @@ def shell_limits(
     edge; the velocities (m, 3) are those of the pieces. Sinkages change in place.
     """
     count = len(starts)
-    points, limits = np.zeros((count, 3)), np.zeros(count)
+    points, limits, footing = np.zeros((count, 3)), np.zeros(count), 0.0
     shares, contacts, depths = np.zeros(count), np.zeros(count), np.zeros(count)
-    grounds, falls, mean = np.zeros(count), np.zeros(count), np.zeros(3)
-    fronts, footing = standing(heights, grid, starts, ends, normals, is_edge, ways[1]), 0.0
+    grounds, falls = np.zeros(count), np.zeros(count)
+    fronts = standing(heights, grid, starts, ends, normals, is_edge, ways[1])
     for k in range(count):
         a, b, normal = row(starts, k), row(ends, k), row(normals, k)
         share, depth, middle = row(fronts, k)
@@ -77,9 +77,7 @@ def shell_limits(
             a, b = moved(a, PLATE_THICKNESS_M, normal), moved(b, PLATE_THICKNESS_M, normal)
             share, depth, middle = buried_between(heights, grid, a, b, normal)
         shares[k] = share
-        for i in range(3):
-            points[k, i] = a[i] + middle * (b[i] - a[i])
-            mean[i] += velocities[k, i] / count
+        put_between(points, k, a, b, middle)
         if share > 0.0:
             contacts[k] = min(1.0, depth / PLATE_THICKNESS_M)
             lowest, grounds[k] = surroundings(heights, grid, points[k, 0], points[k, 1], ways[0])
@@ -87,7 +85,7 @@ def shell_limits(
             falls[k] = surface_height(heights, grid, points[k, 0], points[k, 1]) - lowest
             if not is_edge[k]:
                 footing += contacts[k] * shares[k] * level_breadth(a, b, normal) / rows
-    lengths = renewal_lengths(points, shares, is_edge, mean, width)
+    lengths = renewal_lengths(points, shares, is_edge, mean_row(velocities), width)
     press_down(sinkages, grounds, shares, points[:, 2], velocities, lengths, dt)
     for k in range(count):
         area = areas[k] * (soil.penetration_scale if is_edge[k] else 1.0)
@@ -97,14 +95,29 @@ def shell_limits(
             limits[k] *= bearing_pressure(sinkages[k], depths[k], breadth, falls[k], soil)
         if fronts[k, 0] > 0.0:
             if shares[k] <= 0.0:
-                for i in range(3):
-                    points[k, i] = starts[k, i] + fronts[k, 2] * (ends[k, i] - starts[k, i])
-            if is_edge[k]:
-                push = blunt_pressure(fronts[k, 1], row(normals, k), soil)
-            else:
+                put_between(points, k, row(starts, k), row(ends, k), fronts[k, 2])
+            push = blunt_pressure(fronts[k, 1], row(normals, k), soil)
+            if not is_edge[k]:
                 push = front_pressure(weighed, grid, starts, ends, normals, fronts, rows, k, soil)
             limits[k] += area * fronts[k, 0] * push
     return points, limits
+
+
+@kernel
+def put_between(points: Array, k: int, start: Vector, end: Vector, share: float) -> None:
+    """Put a point (a row of (n, 3)) at some share of the way from a start to an end."""
+    for i in range(3):
+        points[k, i] = start[i] + share * (end[i] - start[i])
+
+
+@kernel
+def mean_row(array: Array) -> Array:
+    """Return the mean (3,) of the rows of an array (n, 3)."""
+    mean = np.zeros(3)
+    for k in range(len(array)):
+        for i in range(3):
+            mean[i] += array[k, i] / len(array)
+    return mean
 
 
 @kernel

@@ -37,9 +37,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     The rest is here: settings, spaces, seeds, pictures, the command and its mask, the metrics.
 
     `reset(seed=s)` selects `scene_id = s` and `target_id = s % 4`; `reset(options={"scene_id": …, "target_id": …,
-    "stage": …, "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4`, or the
-    task's default, without a stage the scene is as it was drawn, and without `commands` the task decides whether the
-    command changes. A reset with nothing draws a scene.
+    "stage": …, "commands": [(frame, target), …]})` selects directly; without a target it is `scene_id % 4` or the one
+    the task names, and without `commands` the task decides whether it changes. A reset with nothing draws a scene.
 
     Where the mask source finds nothing, the machine is held still until it does: `reset` and `step` pass as many frames
     as that takes, and `mask_missing_frames` counts them. After `MASK_MISSING_LIMIT_S` the episode is given up:
@@ -237,8 +236,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         """
         super().reset(seed=seed)
         rng, length = self.np_random, self.episode_length
-        selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
-        self._selection = selection
+        selection = self._selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
         self._commands, self._main_img, self._is_over = [], None, False

@@ -36,8 +36,9 @@ def select_episode(
     """Choose scene, target and changes of the command.
 
     Without options the scene is the seed, or drawn if there is none, and its remainder the target, unless the task has
-    a default of its own. Options may hold `scene_id`, `target_id`, `stage` (cycles dug before the start) and `commands` (changes of the command, as pairs of the number of actions carried out before and the
-    target, in an episode of `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
+    a default of its own. Options may hold `scene_id`, `target_id`, `stage` (cycles dug before the start), `commands`
+    (changes of the command, as pairs of the number of actions carried out before and the target, in an episode of
+    `length` frames), and LeRobot's own keys, which begin with `lerobot_`.
 
     Raises:
         ConfigurationError: A value is not a whole number or out of range, or an option is unknown.

@@ -19,8 +19,8 @@ from lerobot_excav.envs.tasks.clear.cycle_record import (
     place,
 )
 from lerobot_excav.envs.tasks.clear.event_list import EventList
-from lerobot_excav.envs.tasks.clear.planner import Proposal
 from lerobot_excav.envs.tasks.clear.spec import CYCLE_LIMIT_S
+from lerobot_excav.envs.tasks.planner.plan import Proposal
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, SETTLING_TICKS, DigCycle
 
 _HALF_DIG_AREA_M = 0.5 * np.array(DIG_AREA_EXTENT_M)

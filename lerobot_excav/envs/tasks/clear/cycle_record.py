@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.tasks.clear.planner import Proposal
+from lerobot_excav.envs.tasks.planner.plan import Proposal
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, DigCycle
 
 DUMPED, TIMED_OUT, SPILLED, UNFINISHED = ENDS = ("dump", "time-out", "spill", "unfinished")

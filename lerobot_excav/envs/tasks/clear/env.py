@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
-from lerobot_excav.envs.tasks.clear.planner import Plan, plan_targets
-from lerobot_excav.envs.tasks.clear.score_overlay import with_scores
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
-from lerobot_excav.envs.tasks.clear.surface import SeenSurface, see_surface
+from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets
+from lerobot_excav.envs.tasks.planner.score_overlay import with_scores
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.scene import Scene

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
-from lerobot_excav.envs.tasks.scoop.zones import NO_ZONES, Zone, parsed_zones
+from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
 from lerobot_excav.setting import setting, with_default

@@ -17,9 +17,9 @@ from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import SoilParameters
+from lerobot_excav.envs.tasks.planner.full_view import propose_regions
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
-from lerobot_excav.envs.tasks.scoop.regions import propose_most_soil
 from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
@@ -53,7 +53,7 @@ def draw_start(
     *,
     soil: str | SoilParameters = "sand",
     fidelity: str = "standard",
-    propose: Propose = propose_most_soil,
+    propose: Propose = propose_regions,
 ) -> Scene:
     """Return the scene as it is after `stage` cycles, with the regions that are proposed then; memoised.
 

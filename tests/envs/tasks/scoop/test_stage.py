@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
+from lerobot_excav.envs.tasks.planner.full_view import propose_regions
 from lerobot_excav.envs.tasks.scoop import stage
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
-from lerobot_excav.envs.tasks.scoop.regions import propose_most_soil
 from lerobot_excav.envs.tasks.scoop.scene import draw_scene
 from lerobot_excav.envs.tasks.scoop.stage import dig_cycle, draw_start, operator_rng, settle
 
@@ -45,7 +45,7 @@ def test_stages_are_drawn_once_and_the_same_again(starts):
 
 def test_a_stage_is_the_one_before_and_one_cycle_of_the_same_operator(starts):
     worksite = started(starts[1])
-    target = propose_most_soil(worksite)[0]
+    target = propose_regions(worksite)[0]
     assert np.array_equal(target.center_w, starts[1].targets[0].center_w)
     scene = dataclasses.replace(starts[1], targets=(target,))
     cycle = dig_cycle(worksite, scene, DigOperator(rng=operator_rng(*SCENE, 2)))
@@ -74,7 +74,7 @@ def test_a_later_start_lies_still_and_begins_where_the_machine_has_dumped(starts
 
 def test_other_regions_give_another_start():
     def last_of_all(worksite):
-        return propose_most_soil(worksite)[::-1]
+        return propose_regions(worksite)[::-1]
 
     assert not np.array_equal(start_at(1, propose=last_of_all).heights_m, start_at(1).heights_m)
 

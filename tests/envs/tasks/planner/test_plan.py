@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
-from lerobot_excav.envs.tasks.clear.candidates import LEAST_SWEPT_M3, LONGEST_ONSET_M, RADIUS_RANGE_M
-from lerobot_excav.envs.tasks.clear.keep_out import is_barred
-from lerobot_excav.envs.tasks.clear.planner import plan_targets
+from lerobot_excav.envs.tasks.planner.candidates import LEAST_SWEPT_M3, LONGEST_ONSET_M, RADIUS_RANGE_M
+from lerobot_excav.envs.tasks.planner.keep_out import is_barred
+from lerobot_excav.envs.tasks.planner.plan import plan_targets
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M
 
 from .conftest import surface_of, surface_of_scene

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.machines.excavator.cameras import MAIN
 from lerobot_excav.envs.machines.excavator.kinematics import inverse
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
-from lerobot_excav.envs.tasks.clear.surface import see_surface
+from lerobot_excav.envs.tasks.planner.surface import see_surface
 
 SOIL_M = 0.05
 

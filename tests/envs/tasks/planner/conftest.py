@@ -5,7 +5,7 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
-from lerobot_excav.envs.tasks.clear.surface import MAP_CELL_M, SeenSurface, see_surface
+from lerobot_excav.envs.tasks.planner.surface import MAP_CELL_M, SeenSurface, see_surface
 from lerobot_excav.envs.tasks.scoop.scene import draw_scene
 
 PICTURE_PX = (192, 256)

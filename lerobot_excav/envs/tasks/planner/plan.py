@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
-from lerobot_excav.envs.tasks.clear.candidates import (
+from lerobot_excav.envs.tasks.planner.candidates import (
     LEAST_SEEN_SHARE,
     LEAST_SWEPT_M3,
     LONGEST_ONSET_M,
     Candidates,
     find_candidates,
 )
-from lerobot_excav.envs.tasks.clear.surface import SeenSurface
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface
+from lerobot_excav.envs.tasks.planner.zones import Zone
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M, Target
-from lerobot_excav.envs.tasks.scoop.zones import Zone
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
 
 

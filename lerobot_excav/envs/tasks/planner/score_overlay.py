@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.overlay import tinted
-from lerobot_excav.envs.tasks.clear.planner import Plan
-from lerobot_excav.envs.tasks.clear.surface import SeenSurface
+from lerobot_excav.envs.tasks.planner.plan import Plan
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface
 
 WORST_RGB, BEST_RGB = (40, 60, 160), (250, 220, 50)
 _OPACITY = 0.45

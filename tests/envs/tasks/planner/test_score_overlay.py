@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lerobot_excav.envs.tasks.clear.planner import plan_targets
-from lerobot_excav.envs.tasks.clear.score_overlay import with_scores
+from lerobot_excav.envs.tasks.planner.plan import plan_targets
+from lerobot_excav.envs.tasks.planner.score_overlay import with_scores
 
 
 def test_scores_colour_the_pile_and_nothing_else(see, worksite, renderer):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
-from lerobot_excav.envs.tasks.scoop.zones import Zone
+from lerobot_excav.envs.tasks.planner.zones import Zone
 
 
 def is_barred(

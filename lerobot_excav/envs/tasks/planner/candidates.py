@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import BUCKET_INNER_WIDTH_M, MACHINE_POS_W
 from lerobot_excav.envs.machines.excavator.layout import world_from_cylinder
-from lerobot_excav.envs.tasks.clear.keep_out import is_barred
-from lerobot_excav.envs.tasks.clear.surface import SeenSurface
+from lerobot_excav.envs.tasks.planner.keep_out import is_barred
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface
+from lerobot_excav.envs.tasks.planner.zones import Zone
 from lerobot_excav.envs.tasks.scoop.feasibility import PATCH_SIZE_M
-from lerobot_excav.envs.tasks.scoop.zones import Zone
 
 RADIUS_RANGE_M = (3.3, 6.2)
 """Distance of a region's centre from the swing axis [m] (kind: tuned, on other piles of the same kind)."""

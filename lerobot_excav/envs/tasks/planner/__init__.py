@@ -1,0 +1,1 @@
+"""The target planner: where an excavator could dig next, from what is seen of the soil."""
