@@ -9,6 +9,7 @@ import numpy as np
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
+from lerobot_excav.envs.tasks.scoop.operator.sight import CycleSight
 from lerobot_excav.envs.tasks.scoop.scene import draw_scene
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.errors import require
@@ -38,15 +39,6 @@ class Condition:
         return self.delay_ms * TICKS_PER_SECOND // 1000
 
 
-@dataclass
-class Sight:
-    """What the operator looks at, in place of an environment."""
-
-    worksite: Worksite
-    cycle: DigCycle
-    fps: int
-
-
 def drive(condition: Condition, *, scene_set: str, scene_id: int, target_id: int, seed: int) -> dict[str, Any]:
     """Let the scripted operator dig one scoop under a condition; return its outcome as data.
 
@@ -55,7 +47,8 @@ def drive(condition: Condition, *, scene_set: str, scene_id: int, target_id: int
     """
     worksite, scene = Worksite(), draw_scene(scene_set, scene_id)
     worksite.reset(scene)
-    sight = Sight(worksite, DigCycle(worksite, scene, target_id), condition.rate_hz)
+    cycle = DigCycle(worksite, scene, target_id)
+    sight = CycleSight(worksite=worksite, cycle=cycle, fps=condition.rate_hz)
     operator = SCOOP.make_operator(np.random.default_rng((seed, scene_id, target_id)))
     operator.reset(sight)
     ticks_per_command = TICKS_PER_SECOND // condition.rate_hz
@@ -66,12 +59,12 @@ def drive(condition: Condition, *, scene_set: str, scene_id: int, target_id: int
             command = operator.act(sight)
         on_the_way.append(command)
         worksite.tick(on_the_way.popleft())
-        sight.cycle.update()
-        if sight.cycle.is_complete:
+        cycle.update()
+        if cycle.is_complete:
             break
     return {
         **{"rate_hz": condition.rate_hz, "delay_ms": condition.delay_ms},
         **{"scene_set": scene_set, "scene_id": scene_id, "target_id": target_id, "operator_seed": seed},
-        **{"simulation_version": SCOOP.simulation_version, "is_success": sight.cycle.is_success},
-        **sight.cycle.metrics(),
+        **{"simulation_version": SCOOP.simulation_version, "is_success": cycle.is_success},
+        **cycle.metrics(),
     }

@@ -6,6 +6,9 @@ from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
+CYCLE_LIMIT_S = 25.0
+"""Time after which one of several cycles on a pile is given up [s]; late ones take up to 20 s (kind: tuned)."""
+
 
 @dataclass(kw_only=True)
 class TaskState:

@@ -5,7 +5,7 @@ soil is laid down, so that a start is nothing but heights and a pose: it can be 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -20,30 +20,20 @@ from lerobot_excav.envs.soil import SoilParameters
 from lerobot_excav.envs.tasks.planner.full_view import propose_regions
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
+from lerobot_excav.envs.tasks.scoop.operator.sight import CycleSight
 from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 
 Propose = Callable[[Worksite], Sequence[Target]]
 """Says which regions of a worksite to dig next, the best first: as many as a scene has."""
 
-CYCLE_LIMIT_S = 25.0
-"""When a cycle of the operator is given up [s]: late ones take 20 s (kind: tuned)."""
-
 _FPS = 10
 _TICKS_PER_FRAME = TICKS_PER_SECOND // _FPS
 # Names the family of the operators' random streams; changing it changes every start but those of stage 0.
 _STREAM = 0x57A6E
 _SETTLING_TICKS = round(10.0 / TICK_S)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _View:
-    """What the operator looks at."""
-
-    worksite: Worksite
-    cycle: DigCycle
-    fps: int = _FPS
 
 
 def draw_start(
@@ -98,10 +88,10 @@ def operator_rng(scene_set: str, scene_id: int, stage: int) -> np.random.Generat
 def dig_cycle(worksite: Worksite, scene: Scene, operator: DigOperator) -> DigCycle:
     """Let the operator dig the first target of a scene, as it is now, until the cycle is complete or given up."""
     cycle = DigCycle(worksite, scene, 0)
-    view = _View(worksite=worksite, cycle=cycle)
-    operator.reset(view)
+    sight = CycleSight(worksite=worksite, cycle=cycle, fps=_FPS)
+    operator.reset(sight)
     for _ in range(round(CYCLE_LIMIT_S * _FPS)):
-        action = checked_action(operator.act(view))
+        action = checked_action(operator.act(sight))
         for _ in range(_TICKS_PER_FRAME):
             worksite.tick(action)
             cycle.update()

@@ -11,8 +11,8 @@ from lerobot_excav.envs.tasks.clear import env as env_module
 from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, failure_of, missing_soil
 from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord, clear_outcome
-from lerobot_excav.envs.tasks.clear.repeating import RepeatingOperator
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.errors import ConfigurationError
 
 STILL = np.zeros(4, np.float32)
@@ -41,7 +41,7 @@ def cleared():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(env_module, "CYCLES", 2)
         env.reset(options={"scene_id": 0})
-        operator = RepeatingOperator(rng=np.random.default_rng(0))
+        operator = DigOperator(rng=np.random.default_rng(0))
         operator.reset(env)
         total, is_over = 0.0, False
         while not is_over:

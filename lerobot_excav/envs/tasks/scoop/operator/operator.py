@@ -1,17 +1,15 @@
 """The scripted operator: digs any target of any scene through the four joysticks."""
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
-from lerobot_excav.envs.machines.excavator.worksite import Worksite
-from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, DigCycle
+from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG
 from lerobot_excav.envs.tasks.scoop.operator.dig import plan_dig
 from lerobot_excav.envs.tasks.scoop.operator.motion import CarefulMotion, JointMotion
 from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_dump, plan_lift
 from lerobot_excav.envs.tasks.scoop.operator.reach import bucket_pose, joint_pos_near
+from lerobot_excav.envs.tasks.scoop.operator.sight import Sight
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor, Variation, draw_variation
 
 PHASES = ("reach", "cut", "curl", "lift", "carry", "dump", "rest")
@@ -26,39 +24,24 @@ FULL_KG = 500.0
 """Payload at which the cut is broken off [kg]."""
 
 
-class DigView(Protocol):
-    """What the operator looks at; an `ExcavatorEnv` is one."""
-
-    @property
-    def worksite(self) -> Worksite:
-        """Machine, soil and box."""
-
-    @property
-    def cycle(self) -> DigCycle:
-        """The running cycle, with the commanded region."""
-
-    @property
-    def fps(self) -> int:
-        """Commands per second."""
-
-
 class DigOperator:
     """Digs the commanded target, issuing only joystick commands.
 
     It sees the true state of the worksite, plans the path of the bucket in cylinder coordinates around the swing axis
-    and follows it with rate commands. Style and tremor, drawn from `rng`, differ from cycle to cycle. A new command
-    makes it plan again: at once as long as it has not loaded, else when it has dumped what it carries.
+    and follows it with rate commands. Style and tremor, drawn from `rng`, differ from cycle to cycle. A new cycle makes
+    it plan again at once, and so does another target within a cycle as long as it has not loaded; else it first dumps
+    what it carries.
     """
 
     def __init__(self, *, rng: np.random.Generator) -> None:
         self._rng = rng
         self._phase = len(PHASES) - 1
 
-    def reset(self, env: DigView) -> None:
+    def reset(self, env: Sight) -> None:
         """Begin the running cycle of an environment with a newly drawn style."""
         self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
-        self._target_id = env.cycle.target_id
+        self._cycle, self._target_id = env.cycle, env.cycle.target_id
         self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
         self._begin(0, env)
 
@@ -72,9 +55,10 @@ class DigOperator:
         """Whether the cycle is over and the operator rests."""
         return self.phase == "rest"
 
-    def act(self, env: DigView) -> NDArray[np.float32]:
+    def act(self, env: Sight) -> NDArray[np.float32]:
         """Return the joystick command for the next frame: swing, boom, arm, bucket in [-1, 1], (4,) float32."""
-        if env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest"):
+        is_other_target = env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest")
+        if env.cycle is not self._cycle or is_other_target:
             self.reset(env)
         joint_pos = env.worksite.machine.joint_pos
         if self._phase_is_over(joint_pos, env):
@@ -91,7 +75,7 @@ class DigOperator:
         command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
         return np.asarray(command, dtype=np.float32)
 
-    def _begin(self, phase: int, env: DigView) -> None:
+    def _begin(self, phase: int, env: Sight) -> None:
         """Start a phase from where the machine is, after the style's pause."""
         self._phase = phase
         self._time_s = -self._variation.pauses_s[phase]
@@ -116,7 +100,7 @@ class DigOperator:
         }
         return [joint_pos, *(joint_pos_near(pose, keep="pin") for pose in plans[self.phase]()[1:])]
 
-    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: DigView) -> bool:
+    def _phase_is_over(self, joint_pos: NDArray[np.float64], env: Sight) -> bool:
         if self.done:
             return False
         payload_kg = env.worksite.soil.payload_mass_kg
