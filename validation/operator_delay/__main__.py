@@ -49,6 +49,8 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     given = _parser().parse_args(arguments)
+    if given.scoops < 1:
+        _parser().error(f"--scoops={given.scoops}; allowed: 1 and above")
     conditions = [Condition(rate_hz=rate, delay_ms=delay) for rate in given.rates for delay in given.delays]
     wanted = [(condition, scoop) for scoop in range(given.scoops) for condition in conditions]
     given.file.parent.mkdir(parents=True, exist_ok=True)

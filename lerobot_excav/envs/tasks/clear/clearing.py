@@ -19,9 +19,9 @@ from lerobot_excav.envs.tasks.clear.cycle_record import (
     place,
 )
 from lerobot_excav.envs.tasks.clear.event_list import EventList
-from lerobot_excav.envs.tasks.clear.spec import CYCLE_LIMIT_S
 from lerobot_excav.envs.tasks.planner.plan import Proposal
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, SETTLING_TICKS, DigCycle
+from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S
 
 _HALF_DIG_AREA_M = 0.5 * np.array(DIG_AREA_EXTENT_M)
 
@@ -74,7 +74,8 @@ class Clearing:
     @property
     def end(self) -> str | None:
         """How the running cycle has ended, or None if it has not."""
-        if self.cycle.is_complete:
+        # Soil of the cycle before may still fall into the box; that is no dump of this one.
+        if self.cycle.is_complete and self.cycle.onset_time_s is not None:
             return DUMPED
         if self._lost_ticks >= SETTLING_TICKS:
             return SPILLED
@@ -83,7 +84,9 @@ class Clearing:
     def finish(self, end: str) -> None:
         """Put the running cycle down as ended."""
         number, state = len(self.records), self.cycle.state
-        self._events.add(end, number, self.cycle, state.deposited_mass_kg if end == DUMPED else state.bucket_mass_kg)
+        if end != SPILLED:  # the spill itself is in the list
+            mass_kg = state.deposited_mass_kg if end == DUMPED else state.bucket_mass_kg
+            self._events.add(end, number, self.cycle, mass_kg)
         self.records.append(self._record(end))
         self._is_running = False
 

@@ -36,7 +36,8 @@ class ClearEnv(ExcavatorEnv):
 
     Scene, observation and action are those of `Scoop-v0`.
 
-    Reward: gain of soil in the box divided by 485 kg, plus 1 on success at the end.
+    Reward: gain of soil in the box divided by 485 kg, plus 1 when it ends by itself with success: not at the time
+    limit, which truncates it.
 
     Success: at least 75 % of the pile is removed and nothing of the machine hit the box hard. `info["is_success"]` is
     true at the end of the episode only.

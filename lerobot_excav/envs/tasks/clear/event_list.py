@@ -17,7 +17,7 @@ FULL_KG = 400.0
 class EventList:
     """Collects events; each is a dictionary of plain values, as it goes into the metrics file.
 
-    `event` is one of `EVENTS`, `spill` also as the end of a cycle, or `unfinished`; `time_s` counts from the start of
+    `event` is one of `EVENTS`; `time_s` counts from the start of
     the episode; `region_w` is the centre of the commanded region; `mass_kg` is the payload, of a spill what was lost,
     and of a dump what the box has gained.
     """

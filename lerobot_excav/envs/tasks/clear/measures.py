@@ -130,8 +130,8 @@ def clear_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
     """Return masses [kg] and events of an episode from its task states, (n, 8), whose counts begin anew every cycle."""
     names = ("deposited_mass_kg", "excavated_mass_kg", "hard_target_contacts", "spill_before_target_events")
     columns = task_state[:, [TASK_STATE_NAMES.index(name) for name in names]]
-    # Within a cycle nothing of these falls, but for a few grains that leave the box again.
-    ends = np.flatnonzero(np.diff(columns[:, 1]) < 0.0)
+    # Within a cycle none of these falls, but for a few grains that leave the box again.
+    ends = np.flatnonzero((np.diff(columns[:, 1:], axis=0) < 0.0).any(axis=1))
     sums = columns[[*ends, len(columns) - 1]].sum(axis=0)
     return {
         "retained_mass_kg": float(sums[0]),

@@ -26,6 +26,8 @@ def propose_regions(worksite: Worksite) -> tuple[Target, ...]:
                 break
             if all(np.hypot(*(center_w - taken)[:2]) >= distance_m for taken in centers_w):
                 centers_w.append(center_w.copy())
+    for center_w in centers_w:
+        center_w.flags.writeable = False  # starts are memoised
     return tuple(Target(center_w=center_w, yaw_rad=cylinder_from_world(center_w)[1]) for center_w in centers_w)
 
 

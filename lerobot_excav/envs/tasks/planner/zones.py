@@ -16,7 +16,7 @@ def parsed_zones(field: str, text: str) -> tuple[Zone, ...]:
     Raises:
         ConfigurationError: A zone is not four numbers that span an area; the message names the field.
     """
-    if text == NO_ZONES:
+    if text.strip() == NO_ZONES:
         return ()
     return tuple(_zone(f"{field}={shown(text)}", part) for part in text.split(";"))
 

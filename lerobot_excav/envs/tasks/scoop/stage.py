@@ -16,7 +16,7 @@ from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
-from lerobot_excav.envs.soil import SoilParameters
+from lerobot_excav.envs.soil import Soil, SoilParameters
 from lerobot_excav.envs.tasks.planner.full_view import propose_regions
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
@@ -110,10 +110,16 @@ def settle(worksite: Worksite) -> None:
     soil = worksite.soil
     soil.lay_down()
     for _ in range(_SETTLING_TICKS):
-        heights_m = soil.heights_m.copy()
+        before_m = _lying_m(soil)
         soil.step(TICK_S, None)
-        if np.array_equal(heights_m, soil.heights_m):
+        if np.array_equal(before_m, _lying_m(soil)):
             return
+
+
+def _lying_m(soil: Soil) -> NDArray[np.float64]:
+    """Return all heights, of the dig area and of the box."""
+    assert soil.container_heights_m is not None  # a worksite has a box
+    return np.concatenate([soil.heights_m.ravel(), soil.container_heights_m.ravel()])
 
 
 def _kept(array: NDArray[np.float64] | None) -> NDArray[np.float64]:

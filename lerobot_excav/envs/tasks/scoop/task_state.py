@@ -24,7 +24,7 @@ class TaskMeter:
     """Keeps the task state up to date, tick by tick.
 
     Args:
-        worksite: Where the machine works, freshly reset.
+        worksite: Where the machine works, as it is at the start of the cycle.
         target: The commanded dig region.
     """
 
@@ -32,9 +32,10 @@ class TaskMeter:
         self._worksite = worksite
         self._target = target
         self._box_mass_start_kg = worksite.soil.box_mass_kg
-        self._in_hard_contact = False
+        # A cycle may begin with what the one before has left: a load, or a contact that lasts.
+        self._in_hard_contact = worksite.machine.box_contact_force_n >= HARD_CONTACT_FORCE_N
         self.carry = CarryWatch(worksite)
-        self.state = TaskState()
+        self.state = TaskState(bucket_mass_kg=worksite.soil.payload_mass_kg)
         self._measure_places()
 
     def retarget(self, target: Target) -> None:
