@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.tasks.clear import clearing as clearing_module
 from lerobot_excav.envs.tasks.clear import env as env_module
 from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, failure_of, missing_soil
@@ -13,6 +14,7 @@ from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord, clear_outcome
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
+from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 from lerobot_excav.errors import ConfigurationError
 
 STILL = np.zeros(4, np.float32)
@@ -119,6 +121,26 @@ def test_what_was_done_is_told_beside_what_was_commanded(cleared):
         # The cut leads from the region towards the machine, at x = -4.6 m.
         assert cycle.exit_w[0] < cycle.source_w[0] < cycle.region_w[0] + 0.1
         assert 0.2 < cycle.depth_m < 1.2
+
+
+def test_soil_that_still_falls_into_the_box_is_no_dump_of_the_next_cycle(env, monkeypatch):
+    monkeypatch.setattr(clearing_module, "CYCLE_LIMIT_S", 3.0)
+    env.reset(options={"scene_id": 3})
+    over_box_w = np.asarray(TARGET_BOX.center_w) + [[0.0, 0.0, 1.5 + 0.2 * k] for k in range(40)]
+    env.worksite.soil.add_parcels(over_box_w, np.zeros_like(over_box_w))
+    play(env, 30)
+    (record,) = env.clearing.records
+    assert record.retained_mass_kg > 20.0
+    assert (record.end, record.failure) == ("time-out", "no soil")
+
+
+def test_hard_contacts_of_a_cycle_that_loaded_nothing_are_summed():
+    names = TASK_STATE_NAMES
+    states = np.zeros((4, len(names)), np.float32)
+    states[1, names.index("hard_target_contacts")] = 1
+    states[3, names.index("spill_before_target_events")] = 1
+    outcome = clear_outcome(states)
+    assert (outcome["hard_target_contacts"], outcome["spill_before_target_events"]) == (1, 1)
 
 
 def test_an_episode_may_begin_after_some_cycles_and_its_pile_is_what_is_left_then(env):

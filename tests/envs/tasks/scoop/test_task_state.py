@@ -37,6 +37,15 @@ def test_excavated_mass_counts_soil_that_enters_again_twice():
     assert meter.state.excavated_mass_kg == 50.0
 
 
+def test_what_the_cycle_before_has_left_is_not_counted_again():
+    _, site = meter_and_site()
+    site.soil.payload_mass_kg, site.machine.box_contact_force_n = 80.0, 6000.0
+    meter = TaskMeter(site, TARGET)
+    assert meter.state.bucket_mass_kg == 80.0
+    meter.update()
+    assert (meter.state.excavated_mass_kg, meter.state.hard_target_contacts) == (0.0, 0)
+
+
 def test_deposited_mass_starts_at_the_box_as_it_was():
     meter, site = meter_and_site(box_mass_kg=300.0)
     site.soil.box_mass_kg = 340.0
