@@ -126,7 +126,8 @@ def test_what_was_done_is_told_beside_what_was_commanded(cleared):
 def test_soil_that_still_falls_into_the_box_is_no_dump_of_the_next_cycle(env, monkeypatch):
     monkeypatch.setattr(clearing_module, "CYCLE_LIMIT_S", 3.0)
     env.reset(options={"scene_id": 3})
-    over_box_w = np.asarray(TARGET_BOX.center_w) + [[0.0, 0.0, 1.5 + 0.2 * k] for k in range(40)]
+    places = np.stack(np.meshgrid([-0.4, -0.2, 0.0, 0.2, 0.4], [-0.3, 0.0, 0.3], [1.2, 1.4], indexing="ij"), axis=-1)
+    over_box_w = np.asarray(TARGET_BOX.center_w) + places.reshape(-1, 3)
     env.worksite.soil.add_parcels(over_box_w, np.zeros_like(over_box_w))
     play(env, 30)
     (record,) = env.clearing.records
