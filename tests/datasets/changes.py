@@ -209,6 +209,19 @@ def flip(path, share):
     return apply
 
 
+def damage_page(path):
+    """Change a bit at the head of the first page of a Parquet file's first column."""
+
+    def apply(root):
+        place = root / path
+        head = pq.read_metadata(place).row_group(0).column(0).data_page_offset
+        data = bytearray(place.read_bytes())
+        data[head + 1] ^= 1
+        place.write_bytes(bytes(data))
+
+    return apply
+
+
 def remove(path):
     def apply(root):
         for place in sorted(root.glob(path)):

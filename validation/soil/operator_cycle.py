@@ -19,6 +19,10 @@ SCENES, QUICK_SCENES = 8, 2
     source="Retained mass of a person's cycles in AGX Terrain, sand at 1474 kg/m³ and 39°: 485 ± 65 kg",
     measures="The scripted operator digs, lifts, swings and dumps once per scene; the mass in the box at the end.",
     gate="mean 485 ± 65 kg",
+    reasons={
+        "mean retained mass": "Its cuts were tuned when parcels were taken to pack to 0.56 in the bucket. They pack to "
+        "0.62 and are weighed so now: the same cut brings less."
+    },
 )
 def run(conditions: Conditions) -> Result:
     """Let the scripted operator play validation scenes without pictures."""

@@ -20,6 +20,7 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
             "env": "excavator",
             "scene_set": "train",
             "task": "Reach-v0",
+            "keep_out": "none",
             "scene_id": scene,
             "target_id": target,
             "soil": "sand",

@@ -148,8 +148,9 @@ def test_kernels_let_other_threads_run():
 
     @compiled.kernel
     def waits_for(flag, turns, most):
-        while turns[0] < most:  # counting in an array keeps the compiler from reading the flag only once
+        while turns[0] < most:
             turns[0] += 1
+            np.random.random()  # noqa: NPY002 - it keeps its state in memory, so the compiler cannot read the flag only once
             if flag[0] > 0:
                 return True
         return False
@@ -157,7 +158,7 @@ def test_kernels_let_other_threads_run():
     flag, turns = np.zeros(1, np.int64), np.zeros(1, np.int64)
     waits_for(flag, turns, 1)
     with ThreadPoolExecutor(1) as pool:
-        seen = pool.submit(waits_for, flag, turns, 3 * 10**10)  # half a minute: long enough for the busiest machine
+        seen = pool.submit(waits_for, flag, turns, 3 * 10**9)  # half a minute: long enough for the busiest machine
         while turns[0] < 2:
             time.sleep(0.001)
         flag[0] = 1
