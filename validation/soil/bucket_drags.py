@@ -34,7 +34,7 @@ def drag(
     The depth is that of its lowest inner point, the way is level in the bucket's own frame.
     """
     soil.reset(np.full(soil.heights_m.shape, soil.floor_depth_m))
-    turn = _turn(azimuth_rad)
+    turn = about_z(azimuth_rad)
     rotation = turn @ rotation_at(pitch_rad)
     ahead = turn @ np.array([*way, 0.0])
     middle, lowest = rotation @ BUCKET.centroid_t, float((BUCKET.corners_t @ rotation.T)[:, 2].min())
@@ -57,7 +57,8 @@ def drag(
     return np.array(rows)
 
 
-def _turn(azimuth_rad: float) -> Array:
+def about_z(azimuth_rad: float) -> Array:
+    """Return the rotation (3, 3) about the vertical."""
     c, s = math.cos(azimuth_rad), math.sin(azimuth_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

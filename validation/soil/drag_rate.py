@@ -7,7 +7,7 @@ import numpy as np
 from bench.soil import BUCKET, rotation_at
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.soil import Soil, Tool
-from validation import Array
+from validation.soil.bucket_drags import about_z
 from validation.soil.cover import pairwise_cover
 from validation.soil.experiment import Conditions, experiment, track
 from validation.soil.results import Check, Result, Table
@@ -32,8 +32,8 @@ def load_kg(speed_m_s: float, *, way: tuple[float, float], azimuth_deg: float, f
     depth_m, travel_m = way
     soil = Soil("sand", EXTENT_M, cell_m, fidelity)
     soil.reset(np.full(soil.heights_m.shape, GROUND_M))
-    rotation = _about_z(math.radians(azimuth_deg)) @ rotation_at(math.radians(-105.0))
-    velocity = _about_z(math.radians(azimuth_deg)) @ np.array([-speed_m_s, 0.0, 0.0])
+    rotation = about_z(math.radians(azimuth_deg)) @ rotation_at(math.radians(-105.0))
+    velocity = about_z(math.radians(azimuth_deg)) @ np.array([-speed_m_s, 0.0, 0.0])
     edge_t = np.insert(BUCKET.profile_t[0], 1, 0.0)
     start = -0.5 * travel_m / speed_m_s * velocity + [0.0, 0.0, GROUND_M - depth_m]
     for tick in range(round(travel_m / speed_m_s / TICK_S) + 1):
@@ -46,11 +46,6 @@ def load_kg(speed_m_s: float, *, way: tuple[float, float], azimuth_deg: float, f
         )
         soil.step(TICK_S, tool)
     return soil.payload_mass_kg
-
-
-def _about_z(angle_rad: float) -> Array:
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @experiment(
