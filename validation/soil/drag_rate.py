@@ -50,7 +50,7 @@ def load_kg(speed_m_s: float, *, way: tuple[float, float], azimuth_deg: float, f
 
 @experiment(
     name="drag_rate",
-    title="Drags slow and quick",
+    title="Drags at three speeds",
     source="Quasi-static flow of dry sand is rate-independent (mu(I) tends to a constant; GDR MiDi 2004)",
     measures="The bucket is dragged through level sand at 0.05, 0.4 and 1.6 m/s, at two depths, in three directions, "
     "on cells of two sizes and with two numerical efforts; the load at the end over the mean of the three speeds.",
