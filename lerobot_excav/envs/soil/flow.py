@@ -131,7 +131,7 @@ def _move(layer: Layer, ground: Ground, window: Window, dt: float) -> float:
 
 
 @kernel
-def _creep_anew(layer: Layer, window: Window) -> None:
+def _forget_creep(layer: Layer, window: Window) -> None:
     """Forget how long soil has crept in the columns of a window that were changed."""
     for i in range(window.i0, window.i1):
         for j in range(window.j0, window.j1):
@@ -149,7 +149,7 @@ def flow(layer: Layer, ground: Ground, dt: float) -> tuple[float, bool]:
     window, over_border, left = Window(0, nx, 0, ny), 0.0, dt
     if ground.cohesion_m > 0.0:
         fail_cuts(layer, ground, active_window(layer.active, window))
-    _creep_anew(layer, window)
+    _forget_creep(layer, window)
     while left > 1e-9 * dt:
         failing = active_window(layer.active, window)
         if failing.i1 == 0:

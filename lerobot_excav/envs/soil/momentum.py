@@ -7,7 +7,7 @@ flux through the faces, upwind, divided by the depth at the face.
 
 A thin layer on a slope at the limit would go on for minutes at a few centimetres per second: the law of friction has no
 lower bound of the speed, as real grains have. So soil that has only crept for a while stops, on a slope that is still a
-little too steep. How long it has crept starts anew where soil is changed from outside or a fast flow comes by.
+little too steep. That time counts from zero again where soil is changed from outside or a fast flow comes by.
 """
 
 import math
@@ -36,7 +36,7 @@ CREEP_M_S = 3e-2
 is too steep soil goes down at least as fast."""
 
 FAST_M_S = 0.1
-"""Faster soil is an avalanche, and lets the soil around it creep anew (tuned)."""
+"""Faster soil is an avalanche: the soil around it may creep again (tuned)."""
 
 PATIENCE_S = 1.0
 """Soil that has crept for longer stops (tuned), unless it is too steep even for that (`STEEPER_PER_S`)."""

@@ -127,7 +127,7 @@ class ClearRecord(EpisodeRecord):
 
 
 def clear_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:
-    """Return masses [kg] and events of an episode from its task states, (n, 8), whose counts begin anew every cycle."""
+    """Return masses [kg] and events of an episode from its task states, (n, 8), whose counts every cycle resets."""
     names = ("deposited_mass_kg", "excavated_mass_kg", "hard_target_contacts", "spill_before_target_events")
     columns = task_state[:, [TASK_STATE_NAMES.index(name) for name in names]]
     # Within a cycle none of these falls, but for a few grains that leave the box again.
