@@ -17,7 +17,6 @@ from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
-from lerobot_excav.envs.tasks.task import OBS_TYPES
 from lerobot_excav.envs.tasks.watched import WatchedEnv
 from lerobot_excav.errors import ConfigurationError, require_choice
 
@@ -46,7 +45,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
 
     Args:
         task: Id of the task; that of the class by default.
-        obs_type: One of `OBS_TYPES`.
+        obs_type: One of `task.OBS_TYPES`.
         render_mode: `rgb_array` or None.
         render_height: Of `RenderSettings`, as are the next two: pictures for people, apart from what policies see.
         render_width: See there.
@@ -76,7 +75,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     ) -> None:
         self.task_spec = spec = task_played_by(type(self), self.TASK, task)
         self.settings = spec.make_settings(**settings)
-        require_choice("obs_type", obs_type, OBS_TYPES)
+        require_choice("obs_type", obs_type, spec.obs_types)
         require_choice("render_mode", render_mode, RENDER_MODES)
         self.render_settings = RenderSettings(
             render_height=render_height, render_width=render_width, render_camera=render_camera
@@ -150,6 +149,11 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     @abstractmethod
     def task_state(self) -> NDArray[np.float32]:
         """How far the task is, (k,) float32; never an input of a policy."""
+
+    @property
+    def environment_state(self) -> NDArray[np.float32]:
+        """What pictures would show, as numbers, (n,) float32; a task whose spec names its elements has it."""
+        raise NotImplementedError(f"{self.task} names environment_state_names and does not say what they are")
 
     @property
     @abstractmethod
@@ -346,6 +350,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
 
     def _observe(self) -> dict[str, Any]:
         observation: dict[str, Any] = {"agent_pos": self.agent_pos}
+        if self.obs_type == "state":
+            observation["environment_state"] = self.environment_state
         if self._shows_pixels:
             observation["pixels"] = {camera: self._draw(camera) for camera in self.task_spec.cameras}
         return observation

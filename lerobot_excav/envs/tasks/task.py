@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from lerobot_excav.envs.tasks.measures import TaskMeasures
 
 
-OBS_TYPES = ("pixels_agent_pos", "agent_pos")
-"""With pictures, and without: then no graphics context is made, and a step takes a fraction of the time."""
+OBS_TYPES = ("pixels_agent_pos", "agent_pos", "state")
+"""With pictures, and without: then no graphics context is made, and a step takes a fraction of the time. `state` adds
+what the pictures would show, as numbers: for reinforcement learning."""
 
 
 class Operator(Protocol):
@@ -46,6 +47,8 @@ class TaskSpec:
         action_low: Least value of each.
         action_high: Greatest value of each.
         task_state_names: Elements of `info["task_state"]`.
+        environment_state_names: Elements of `environment_state`, the observation of `obs_type="state"` beside the
+            joints; empty if the task has no such observation.
         duration_s: Time limit unless another is asked for [s].
         storage: How pictures of demonstrations are stored unless asked otherwise; long action chunks need `video`.
         settings: What a user may set; its `ENV_TYPE` is the `--env.type`.
@@ -76,6 +79,7 @@ class TaskSpec:
     action_low: tuple[float, ...]
     action_high: tuple[float, ...]
     task_state_names: tuple[str, ...]
+    environment_state_names: tuple[str, ...] = ()
     duration_s: float
     storage: Literal["image", "video"]
     settings: type[TaskSettings]
@@ -127,12 +131,18 @@ class TaskSpec:
 
     def observation_space(self, obs_type: str, size: tuple[int, int]) -> gym.spaces.Dict:
         """Return the space of observations of one of `OBS_TYPES`; pictures are (height, width) [px]."""
-        joints = gym.spaces.Box(-np.inf, np.inf, (len(self.state_names),), np.float32)
-        spaces: dict[str, gym.Space[Any]] = {"agent_pos": joints}
+        spaces: dict[str, gym.Space[Any]] = {"agent_pos": _unbounded(len(self.state_names))}
+        if obs_type == "state":
+            spaces["environment_state"] = _unbounded(len(self.environment_state_names))
         if obs_type == "pixels_agent_pos":
             image = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
             spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(self.cameras, image))
         return gym.spaces.Dict(spaces)
+
+    @property
+    def obs_types(self) -> tuple[str, ...]:
+        """Those of `OBS_TYPES` that the task offers."""
+        return tuple(name for name in OBS_TYPES if name != "state" or self.environment_state_names)
 
     @property
     def starts_per_scene(self) -> int:
@@ -146,3 +156,7 @@ class TaskSpec:
     def replay_length(self, frames: int) -> int:
         """Return the time limit [frames] under which a recording of this length is judged as it was."""
         return frames if self.judges_at_the_end else frames + 1
+
+
+def _unbounded(size: int) -> gym.spaces.Box:
+    return gym.spaces.Box(-np.inf, np.inf, (size,), np.float32)

@@ -35,6 +35,7 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
     | `pixels/top` | (H, W, 3) uint8 | fixed view from above |
     | `pixels/target_mask` | (H, W, 3) uint8, {0, 255} | commanded block in `main` when it was commanded, arm hidden |
     | `agent_pos` | (7,) float32 | six joint positions [rad], opening of the gripper [0 closed .. 1 open] |
+    | `environment_state` | (15,) float32 | with `obs_type="state"`, in place of pictures: middles of the blocks [m] |
 
     Action: float32 (7,), six joint position targets [rad] and the gripper's target [0..1]; clipped to the limits.
 
@@ -138,6 +139,12 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
     def task_state(self) -> NDArray[np.float32]:
         """State of the task, (8,) float32; see `spec.TASK_STATE_NAMES`."""
         return self.grasp.task_state
+
+    @property
+    def environment_state(self) -> NDArray[np.float32]:
+        """Middle of the commanded block, then of every block, (15,) float32 [m]; see `spec.ENVIRONMENT_STATE_NAMES`."""
+        block_pos_w = self.workcell.block_pos_w
+        return np.concatenate([block_pos_w[self.target_id], block_pos_w.ravel()]).astype(np.float32)
 
     @property
     def is_success(self) -> bool:

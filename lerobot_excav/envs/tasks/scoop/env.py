@@ -15,6 +15,7 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
+from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
@@ -42,6 +43,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     | `pixels/target_mask` | (H, W, 3) uint8, {0, 255} | commanded dig region in `main` when it was commanded |
     | `agent_pos[0:4]` | float32 | joint positions swing, boom, arm, bucket [rad] |
     | `agent_pos[4:8]` | float32 | joint velocities in the same order [rad/s] |
+    | `environment_state` | (151,) float32 | with `obs_type="state"`, in place of pictures: region, loads, heights |
 
     Action: float32 (4,) in [-1, 1], rate commands for swing, boom, arm, bucket; values beyond are clipped.
 
@@ -150,6 +152,11 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     def task_state(self) -> NDArray[np.float32]:
         """Measurements of the cycle, (8,) float32; see `spec.TaskState`."""
         return np.array(astuple(self.cycle.state), np.float32)
+
+    @property
+    def environment_state(self) -> NDArray[np.float32]:
+        """Region, loads and a coarse map of heights, (151,) float32; see `spec.ENVIRONMENT_STATE_NAMES`."""
+        return environment_state(self.worksite, self.target)
 
     @property
     def is_success(self) -> bool:

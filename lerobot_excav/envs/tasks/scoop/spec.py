@@ -26,6 +26,17 @@ class TaskState:
 
 TASK_STATE_NAMES = tuple(field.name for field in fields(TaskState))
 
+HEIGHT_CELLS = (12, 12)
+"""Cells of the coarse map of heights along x and y, 0.5 m wide: a region is 0.8 m wide (kind: guess)."""
+
+ENVIRONMENT_STATE_NAMES = (
+    *("target.x_w", "target.y_w", "target.z_w", "target.sin_yaw", "target.cos_yaw"),
+    *("bucket_mass_t", "box_mass_t"),
+    *(f"height_m.{i}.{j}" for i in range(HEIGHT_CELLS[0]) for j in range(HEIGHT_CELLS[1])),
+)
+"""Elements of `environment_state`: middle of the commanded region [m] and its direction, soil in the bucket and in the
+box [t], and the mean height of the soil [m] cell by cell, from the corner with the least x and y."""
+
 SCOOP = TaskSpec(
     id="Scoop-v0",
     robot_type="excavator_sim",
@@ -37,6 +48,7 @@ SCOOP = TaskSpec(
     action_low=(-1.0,) * len(ACTION_NAMES),
     action_high=(1.0,) * len(ACTION_NAMES),
     task_state_names=TASK_STATE_NAMES,
+    environment_state_names=ENVIRONMENT_STATE_NAMES,
     duration_s=20.0,  # kind: paper
     storage="image",
     settings=ExcavatorSettings,
