@@ -221,6 +221,7 @@ ENV = {
     "metrics_episodes": optional(whole(1)).beside(metrics_path="x"),
     "render_mode": optional(one_of("rgb_array")),
     **dict.fromkeys(("render_height", "render_width"), whole(32, 1024)),
+    "render_every": whole(1, 1000),
     "max_parallel_tasks": whole(1, 1),
     "disable_env_checker": flag,
 }
@@ -325,7 +326,7 @@ CONFIGURATIONS = {
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
     "excavator": (
         ExcavatorEnvConfig,
-        EXCAVATOR | ENV | {"render_camera": one_of("overview", "side", "main", "cab")},
+        EXCAVATOR | ENV | {"render_camera": one_of("overview", "side", "main", "cab", "overview_with_side")},
         {},
     ),
     "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV | {"render_camera": one_of("overview", "main", "top")}, {}),

@@ -1,5 +1,7 @@
 """What every environment of this package shows people, whatever its robot and task."""
 
+from itertools import pairwise
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -121,6 +123,23 @@ def test_whether_people_watch_changes_nothing_that_is_observed(make):
     for alone, watched in zip(*traces, strict=True):
         for name, part in alone.items():
             assert np.array_equal(part, watched[name]), name
+
+
+def test_every_third_frame_is_drawn_and_the_end_if_asked_so(make):
+    env = start(make(render_every=3, episode_length=8))
+    pictures = [env.render()]
+    for _ in range(8):
+        env.step(env.action_space.high)
+        pictures.append(env.render())
+    shown = [picture.tobytes() for picture in pictures]
+    assert [a == b for a, b in pairwise(shown)] == [True, True, False, True, True, False, True, False]
+
+
+def test_a_new_episode_is_drawn_at_once(make):
+    env = start(make(render_every=100))
+    first = env.render()
+    env.reset(options={"scene_id": 5, "target_id": 0})
+    assert not np.array_equal(env.render(), first)
 
 
 def test_nothing_is_made_for_people_before_they_look(make):

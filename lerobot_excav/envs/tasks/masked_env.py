@@ -19,6 +19,7 @@ from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
 from lerobot_excav.envs.tasks.watched import WatchedEnv
 from lerobot_excav.errors import ConfigurationError, require_choice
+from lerobot_excav.setting import declared_settings
 
 RENDER_MODES = ("rgb_array", None)
 
@@ -47,11 +48,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         task: Id of the task; that of the class by default.
         obs_type: One of `task.OBS_TYPES`.
         render_mode: `rgb_array` or None.
-        render_height: Of `RenderSettings`, as are the next two: pictures for people, apart from what policies see.
-        render_width: See there.
-        render_camera: See there; one of the task's `views`.
         depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
-        settings: Fields of the task's `TaskSettings`, by name.
+        settings: Fields of the task's `TaskSettings` and of `RenderSettings`, by name.
 
     Raises:
         ConfigurationError: A setting is unknown or has a value that is not possible.
@@ -67,20 +65,15 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         task: str | None = None,
         obs_type: str = "pixels_agent_pos",
         render_mode: str | None = "rgb_array",
-        render_height: int = RenderSettings.render_height,
-        render_width: int = RenderSettings.render_width,
-        render_camera: str = RenderSettings.render_camera,
         depth_info: bool = False,
         **settings: Any,
     ) -> None:
         self.task_spec = spec = task_played_by(type(self), self.TASK, task)
-        self.settings = spec.make_settings(**settings)
+        shown = {name: settings.pop(name) for name in declared_settings(RenderSettings) if name in settings}
+        self.settings, self.render_settings = spec.make_settings(**settings), RenderSettings(**shown)
         require_choice("obs_type", obs_type, spec.obs_types)
         require_choice("render_mode", render_mode, RENDER_MODES)
-        self.render_settings = RenderSettings(
-            render_height=render_height, render_width=render_width, render_camera=render_camera
-        )
-        require_choice("render_camera", render_camera, spec.views)
+        require_choice("render_camera", self.render_settings.render_camera, spec.views)
         self.task, self.task_description = spec.id, spec.description
         self.obs_type, self.render_mode, self.depth_info = obs_type, render_mode, depth_info
         self.fps = self.settings.fps
@@ -243,7 +236,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         selection = self._selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
         self._start(selection.scene_id, selection.target_id)
         self._frame = self._missing_frames = 0
-        self._commands, self._main_img, self._is_over = [], None, False
+        self._commands, self._main_img, self._picture, self._is_over = [], None, None, False
         self._give_command(selection.target_id)
         self._wait_for_mask()
         return self._observe(), self._info(is_over=False)

@@ -38,6 +38,12 @@ class RenderSettings:
     render_camera: str = setting(
         "Camera of these pictures; which ones there are stands on the page of the environment", default="overview"
     )
+    render_every: int = setting(
+        "Draw every n-th frame only, and show it until the next: for time lapses of long episodes",
+        default=1,
+        low=1,
+        high=1000,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

@@ -24,6 +24,8 @@ class WatchedEnv(ABC):
 
     _is_over = False
     _view: View | None = None
+    _picture: NDArray[np.uint8] | None = None
+    _picture_frame = 0
 
     @abstractmethod
     def _make_view(self, height: int, width: int) -> View:
@@ -70,6 +72,7 @@ class WatchedEnv(ABC):
         """Return a picture for people (`render_height`, `render_width`, 3) uint8, or None without a render mode.
 
         The commanded target is marked, and another target that the mask shows; a caption tells how the task stands.
+        With `render_every` above 1 the last picture is shown again until its time is over; the end is always drawn.
 
         Raises:
             ConfigurationError: The environment has not been reset.
@@ -77,6 +80,12 @@ class WatchedEnv(ABC):
         """
         if self.render_mode is None:
             return None
+        frame, every = round(self.time_s * self.settings.fps), self.render_settings.render_every
+        if self._picture is None or self._is_over or every == 1 or frame - self._picture_frame >= every:
+            self._picture, self._picture_frame = self._draw_for_people(), frame
+        return self._picture.copy()
+
+    def _draw_for_people(self) -> NDArray[np.uint8]:
         settings = self.render_settings
         if self._view is None:
             self._view = self._make_view(settings.render_height, settings.render_width)
@@ -101,4 +110,4 @@ class WatchedEnv(ABC):
         """Free the graphics context of the view."""
         if self._view is not None:
             self._view.close()
-            self._view = None
+            self._view = self._picture = None

@@ -13,5 +13,7 @@ STATE_NAMES = (*(f"{joint}.pos" for joint in JOINT_NAMES), *ACTION_NAMES)
 
 CAMERAS = ("main", "cab", "target_mask")
 
-VIEWS = ("overview", "side", "main", "cab")
-"""Cameras that people may look through."""
+VIEW_CAMERAS = ("overview", "side", "main", "cab")
+OVERVIEW_WITH_SIDE = "overview_with_side"
+VIEWS = (*VIEW_CAMERAS, OVERVIEW_WITH_SIDE)
+"""What people may look at: through a camera, or the overview with the bucket from the side in its corner."""

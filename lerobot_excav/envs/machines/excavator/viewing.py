@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
-from lerobot_excav.envs.machines.excavator.features import VIEWS
+from lerobot_excav.envs.machines.excavator.features import OVERVIEW_WITH_SIDE, VIEW_CAMERAS
+from lerobot_excav.envs.machines.excavator.inset import with_inset
 from lerobot_excav.envs.machines.excavator.scenery import (
     CLEAR_WALL,
     PLUMB_LINE,
@@ -49,7 +50,7 @@ class WorksiteView:
         self._painted: tuple[bytes, ...] = ()
         self._marked: tuple[Patch, ...] = ()
         self._pictures = CameraPictures(
-            self._model, self._data, cameras=VIEWS, height=height, width=width, max_geoms=_MAX_GEOMS,
+            self._model, self._data, cameras=VIEW_CAMERAS, height=height, width=width, max_geoms=_MAX_GEOMS,
             effects=(mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_FOG),
         )  # fmt: skip
         self._all = visible_groups(SURROUNDINGS_GROUP, MACHINE_GROUP, LOOSE_SOIL_GROUP)
@@ -70,6 +71,8 @@ class WorksiteView:
         self._hang_plumb_line()
         mujoco.mj_fwdPosition(self._model, self._data)
         self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
+        if camera == OVERVIEW_WITH_SIDE:
+            return with_inset(*(self._pictures.colour(name, self._all) for name in ("overview", "side")))
         return self._pictures.colour(camera, self._all)
 
     def close(self) -> None:

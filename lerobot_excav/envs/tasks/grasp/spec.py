@@ -18,7 +18,9 @@ TASK_STATE_NAMES = (
 point [m] and from the tray's axis [m], pads that touch it [0..2], whether it is lifted by the fingers, whether it rests
 in the tray, released, how many blocks do so, and the first block that was lifted since the last command (-1: none)."""
 
-ENVIRONMENT_STATE_NAMES = tuple(f"{thing}.{axis}_w" for thing in ("target", "block_0", "block_1", "block_2", "block_3") for axis in "xyz")
+ENVIRONMENT_STATE_NAMES = tuple(
+    f"{thing}.{axis}_w" for thing in ("target", "block_0", "block_1", "block_2", "block_3") for axis in "xyz"
+)
 """Elements of `environment_state`: middle of the commanded block, then of every block [m], world frame."""
 
 GRASP = TaskSpec(
