@@ -1,8 +1,10 @@
 """Tables of evaluations: one row per run, with intervals, and the differences between runs."""
 
 import json
+import re
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -76,9 +78,19 @@ def file_notes(run: Run) -> list[str]:
 def write_report(report: Report, markdown: str, folder: Path) -> None:
     """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made.
 
+    Where the task has a figure, one is drawn for every run, `figure_LABEL.png`.
+
     Raises:
         DatasetError: A file of that name was not written by a report, or was changed since.
     """
     with ReportFolder(folder).staged() as stage:
         write_whole(stage / "report.md", markdown)
         write_whole(stage / "report.json", json.dumps(report.as_dict(), indent=1) + "\n")
+        for run in (row.run for row in report.runs):
+            if run.measures.figure_entry is not None:
+                resolve_name(run.measures.figure_entry)(run.episodes, stage / figure_name(run.label))
+
+
+def figure_name(label: str) -> str:
+    """Return the name of the figure of a run, whose label may hold what is not for file names."""
+    return f"figure_{re.sub(r'[^A-Za-z0-9_.-]+', '_', label)}.png"

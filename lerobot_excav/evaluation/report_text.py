@@ -16,6 +16,7 @@ def report_text(report: Report) -> str:
     return render(
         "report",
         seed=report.bootstrap_seed,
+        sentences=sentences([row.run for row in report.runs]),
         header=["run", *measures.setting, "n", "seeds", *(column.header for column in measures.columns)],
         rows=[_row(row) for row in report.runs],
         differences={
@@ -31,6 +32,12 @@ def report_text(report: Report) -> str:
         lacks_operator=ratios if report.operator is None else [],
         notes=report.notes,
     )
+
+
+def sentences(runs: Sequence[Run]) -> list[str]:
+    """Say of each run in a sentence what came of it, where the task has words for it."""
+    found = [(run.label, run.measures.sentence(run.episodes)) for run in runs if run.measures.sentence is not None]
+    return [text if len(found) == 1 else f"{label}: {text}" for label, text in found]
 
 
 def simulations(runs: Sequence[Run]) -> str:

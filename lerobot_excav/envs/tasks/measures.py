@@ -1,6 +1,6 @@
 """What is measured of a task: the record of an episode, and the columns that sum records up."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
@@ -185,6 +185,8 @@ class TaskMeasures:
         legend: Explains the columns, line by line; takes who the operator was, None without one.
         outcome: Turns the task states of an episode, (n, k), into columns of the paired-scene index.
         summary: Describes the outcomes of an index in a few words.
+        sentence: Says in one sentence what came of episodes; None leaves that to the table.
+        figure_entry: Function that draws episodes into a picture file, what no table can show; None draws nothing.
     """
 
     record: type[EpisodeRecord]
@@ -198,6 +200,8 @@ class TaskMeasures:
     legend: Callable[[str | None], list[str]]
     outcome: Callable[["NDArray[Any]"], dict[str, Any]]
     summary: Callable[["pd.DataFrame"], str]
+    sentence: Callable[[Sequence[Any]], str] | None = None
+    figure_entry: str | None = None
 
     @property
     def constants(self) -> dict[str, str]:

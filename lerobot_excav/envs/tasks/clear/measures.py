@@ -1,7 +1,7 @@
 """What is measured of Clear-v0; `docs/reference/metrics.md` defines the measures."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, override
 
 import numpy as np
@@ -147,6 +147,23 @@ def clear_summary(index: "pd.DataFrame") -> str:
     return f"retained mass: {index['retained_mass_kg'].mean():.0f} kg per pile on average"
 
 
+def clear_sentence(piles: Sequence[ClearRecord]) -> str:
+    """Say in one sentence what was cleared and where digging began."""
+    cycles = [cycle for pile in piles for cycle in pile.cycles]
+    hits, count = sum(cycle.target_success for cycle in cycles), len(piles)
+    removed = 100.0 * float(np.mean([pile.pile_removed for pile in piles]))
+    number = f"{len(cycles) / max(count, 1):.0f} cycles"
+    what = f"{removed:.0f} % of the pile was removed in {number}"
+    if count != 1:
+        what = f"Of {count} piles {removed:.0f} % was removed on average, in {number} each"
+    contacts = sum(pile.hard_target_contacts for pile in piles)
+    hit_hard = {0: "never hit hard", 1: "hit hard once"}.get(contacts, f"hit hard {contacts} times")
+    return (
+        f"{what}; in {hits} of {len(cycles)} cycles digging began inside the region that the mask showed; the box was "
+        f"{hit_hard}."
+    )
+
+
 def _legend(operator: str | None) -> list[str]:
     lines = [
         "Shares of cycles are averaged over piles, each with the same weight.",
@@ -189,4 +206,6 @@ CLEAR_MEASURES = TaskMeasures(
     legend=_legend,
     outcome=clear_outcome,
     summary=clear_summary,
+    sentence=clear_sentence,
+    figure_entry="lerobot_excav.envs.tasks.clear.cut_map:draw_cut_map",
 )

@@ -1,0 +1,48 @@
+import json
+from pathlib import Path
+
+from PIL import Image
+
+from lerobot_excav.envs.tasks.clear.cut_map import MOST_PILES, draw_cut_map
+from lerobot_excav.envs.tasks.clear.measures import ClearRecord, clear_sentence
+from lerobot_excav.scripts.main import main
+
+METRICS = Path("results", "clear", "operator_val.jsonl")
+
+
+def piles(count):
+    lines = METRICS.read_text().splitlines()[:count]
+    return [ClearRecord.model_validate_json(json.dumps(json.loads(line))) for line in lines]
+
+
+def test_every_pile_gets_a_panel_up_to_a_number(tmp_path):
+    widths = []
+    for count in (1, 2, 6):
+        draw_cut_map(piles(count), tmp_path / "map.png")
+        widths.append(Image.open(tmp_path / "map.png").width)
+    assert widths == [widths[0], 2 * widths[0], MOST_PILES * widths[0]]
+
+
+def test_a_pile_that_was_never_dug_is_drawn(tmp_path):
+    pile = piles(1)[0]
+    first = pile.cycles[0].model_copy(update={"onset_w": None, "source_w": None, "target_success": False})
+    draw_cut_map([pile.model_copy(update={"cycles": (first,)})], tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+def test_the_sentence_says_how_much_how_often_and_whether_the_box_was_hit():
+    pile = piles(1)[0]
+    cycles = tuple(cycle.model_copy(update={"target_success": n > 0}) for n, cycle in enumerate(pile.cycles[:4]))
+    told = pile.model_copy(update={"pile_removed": 0.305, "cycles": cycles, "hard_target_contacts": 1})
+    assert clear_sentence([told]) == (
+        "30 % of the pile was removed in 4 cycles; in 3 of 4 cycles digging began inside the region that the mask "
+        "showed; the box was hit hard once."
+    )
+    assert clear_sentence([told, pile]).startswith("Of 2 piles ")
+    assert clear_sentence([pile]).endswith("the box was never hit hard.")
+
+
+def test_a_report_of_piles_says_the_sentence_and_draws_the_map(tmp_path, capsys):
+    assert main(["report", f"a b={METRICS}", f"--out={tmp_path}"]) == 0
+    assert "Of 6 piles 71 % was removed on average" in capsys.readouterr().out
+    assert Image.open(tmp_path / "figure_a_b.png").width > 1000
