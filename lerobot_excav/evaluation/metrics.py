@@ -24,7 +24,7 @@ class Evaluation:
         of: How many evaluations the file holds; LeRobot appends one after the other, and this is the last.
         operator: Who played, if the file says so: `scripted`, `human`, or None for a policy.
         seed: Seed of the first episode; LeRobot's `--seed`. None if the file does not say.
-        episodes: Outcomes by scene and target.
+        episodes: Outcomes by scene, stage and target.
     """
 
     path: Path
@@ -135,6 +135,8 @@ def _by_key(lines: list[_Line], measures: TaskMeasures) -> dict[EpisodeKey, Epis
     for line in lines:
         episode = validated(measures.record, line.text, line.place)
         if episode.key in episodes:
-            raise DatasetError(f"{line.place}: scene and target {episode.key} occur twice; are these two evaluations?")
+            raise DatasetError(
+                f"{line.place}: scene, stage and target {episode.key} occur twice; are these two evaluations?"
+            )
         episodes[episode.key] = episode
     return episodes

@@ -10,10 +10,10 @@ from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.demonstration_settings import PlayedScenes
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.simulation import play_demonstration
-from lerobot_excav.datasets.record.workers import episode_result, submit_episode, worker_pool
+from lerobot_excav.datasets.record.workers import episode_results, submit_episodes, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
 from lerobot_excav.envs.configs.provenance import write_provenance
-from lerobot_excav.errors import ConfigurationError, DatasetError
+from lerobot_excav.errors import ConfigurationError, DatasetError, ExcavError
 from lerobot_excav.run_lock import RunLock
 from lerobot_excav.whole_file import named, write_whole
 
@@ -66,9 +66,10 @@ def _play_rest(
     ):
         for _ in range(first):
             progress.skip()
-        futures = [submit_episode(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]
+        futures = [submit_episodes(pool, progress, play_for_metrics, settings, pair) for pair in pairs[first:]]
         for number, future in enumerate(futures, first):
-            append(json_line({"episode_ix": number, **episode_result(pairs[number], future)["line"]}))
+            (played,) = episode_results(future)
+            append(json_line({"episode_ix": number, **played["line"]}))
 
 
 @contextmanager
@@ -86,10 +87,17 @@ def _append_to(path: Path) -> Iterator[Callable[[str], None]]:
         yield append
 
 
-def play_for_metrics(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
-    """Play one episode and return its `success` and its `line` of the metrics file; runs in a worker."""
-    episode = play_demonstration(settings, pair, with_images=False)
-    return {"success": episode.success, "line": {**_operator(settings), **episode.metrics}}
+def play_for_metrics(settings: PlayedScenes, pair: Pair) -> list[dict[str, Any]]:
+    """Play one episode and return its `success` and its `line` of the metrics file, in a list; runs in a worker.
+
+    Raises:
+        ExcavError: It could not be played; the message names it.
+    """
+    try:
+        episode = play_demonstration(settings, pair, with_images=False)
+    except ExcavError as error:
+        raise ExcavError(f"{pair.uid}: {error}") from error
+    return [{"success": episode.success, "line": {**_operator(settings), **episode.metrics}}]
 
 
 def _operator(settings: PlayedScenes) -> dict[str, Any]:
@@ -105,6 +113,7 @@ def _expected(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
         "simulation_version": settings.task_spec.simulation_version,
         **env,
         "scene_id": pair.scene_id,
+        "stage": pair.stage,
         "target_id": pair.target_id,
         "episode_length": settings.episode_length,
     }

@@ -9,6 +9,8 @@ Examples:
       50 scenes, each with its 4 targets: 200 paired episodes
   lerobot-excav demos --env.type=excavator --env.soil=gravel --scenes=200 --targets=1 --out=outputs/non_paired
       as many episodes, each of another scene, on another soil
+  lerobot-excav demos --env.type=excavator --scenes=50 --stages=0,4,8 --out=outputs/stages
+      50 scenes, each as it is drawn and after 4 and 8 dug cycles, with 4 targets each: up to 600 episodes
   lerobot-excav demos --env.type=fr5_grasp --scenes=200 --targets=1 --target_rule=nearest --out=outputs/nearest
       the arm, sent to the block nearest to it in each of 200 scenes
   lerobot-excav demos --env.type=excavator --scenes=50 --out=outputs/paired --resume=true
@@ -67,10 +69,13 @@ def run(arguments: DemosArguments) -> int:
 
     settings = played(DemonstrationSettings, arguments)
     summary = record_demonstrations(settings, out, workers=arguments.workers, resume=arguments.resume)
-    print(f"{summary.out}: {summary.episodes} episodes of {settings.scenes} scenes")
+    stages = "" if settings.stages == "0" else f" at stages {settings.stages}"
+    print(f"{summary.out}: {summary.episodes} episodes of {settings.scenes} scenes{stages}")
     if summary.failures:
         kept = "kept" if settings.keep_failures else "left out"
         print(f"{len(summary.failures)} episodes without success ({kept}): {' '.join(summary.failures)}")
+    if summary.absent:
+        print(f"{len(summary.absent)} targets skipped, which their starts do not offer: {' '.join(summary.absent)}")
     if summary.waited:
         print(f"{len(summary.waited)} episodes left out, whose machine waited for its mask: {' '.join(summary.waited)}")
     print(

@@ -105,7 +105,7 @@ def test_a_recording_is_repeated_from_its_session_log_completed_and_replayed_bit
     spec, settings = task_of_robot(robot_type), ROBOTS[robot_type][0]
     dataset, session = record(robot_type, 2, scene_set="val", scene_id=6, target_id=3)
     starts = [(each.episode_index, each.pair.uid) for each in session]
-    assert starts == [(0, f"{spec.env_type}/val/6/3"), (1, f"{spec.env_type}/val/7/0")]
+    assert starts == [(0, f"{spec.env_type}/val/6/0/3"), (1, f"{spec.env_type}/val/7/0/0")]
     assert_schema_of_scripted_data(dataset, spec)
     env = spec.make_env(scene_set="val", **SIZE, **settings)
     for episode in session:
@@ -118,7 +118,7 @@ def test_a_recording_is_repeated_from_its_session_log_completed_and_replayed_bit
     assert main.main(["index", str(tmp_path / "data"), f"--session={tmp_path / 'session.jsonl'}"]) == 0
     assert main.main(["qc", str(tmp_path / "data"), "--replays=2"]) == 0
     rows = rows_of(dataset_of(tmp_path), 1)
-    assert rows[0]["excav.pair_uid"] == f"{spec.env_type}/val/7/0"
+    assert rows[0]["excav.pair_uid"] == f"{spec.env_type}/val/7/0/0"
     frames, targets = np.transpose([(0, session[1].pair.target_id), *session[1].schedule])
     assert frames.tolist() == [0, *settings.values()]
     shown = np.repeat(targets, np.diff([*frames, len(rows)]))

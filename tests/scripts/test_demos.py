@@ -70,7 +70,7 @@ def test_the_summary_says_what_was_left_out(env_type, whole, capsys):
     assert main(["demos", *OPTIONS[env_type], f"--out={whole}", "--resume"]) == 0
     output = capsys.readouterr().out
     assert "4 episodes of 2 scenes" in output
-    assert f"4 episodes without success (kept): {env_type}/train/0/0 {env_type}/train/0/1" in output
+    assert f"4 episodes without success (kept): {env_type}/train/0/0/0 {env_type}/train/0/0/1" in output
     assert "x real time" in output
     assert main(["demos", *OPTIONS[env_type], f"--out={whole}"]) == 2
     assert "exists" in capsys.readouterr().err

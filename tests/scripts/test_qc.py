@@ -26,7 +26,7 @@ def test_a_sound_dataset_ends_with_0(dataset, capsys):
 def test_a_failed_episode_ends_with_1_and_is_tabled(dataset, another_simulation, capsys):
     assert main(["qc", str(dataset), "--episodes=[4,5]", "--replays=2"]) == 1
     text = capsys.readouterr().out
-    assert "toy_reach/train/1/0  replay leaves the recorded state" in text
+    assert "toy_reach/train/1/0/0  replay leaves the recorded state" in text
     assert "2 of 2 episodes failed" in text
 
 

@@ -45,7 +45,8 @@ class ReachEnv(MaskedTaskEnv[Table, TableRenderer]):
         self._on_target = self._on_target + 1 if self._distance_m() < SPOT_RADIUS_M else 0
         return float(self._on_target > 0), self.is_success
 
-    def _holding_action(self) -> NDArray[np.float32]:
+    def holding_action(self) -> NDArray[np.float32]:
+        """Return the action that holds the machine still."""
         return np.zeros(2, np.float32)
 
     def _region(self, target_id: int) -> int:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
 from lerobot_excav.envs.machines.pinhole import CameraPose, PinholeCamera
-from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.envs.tasks.settings import SCENE_SETS, TaskSettings
 
 SPOT_RADIUS_M = 0.12
 RING_RADIUS_M = 0.16
@@ -24,9 +24,9 @@ def draw_spots(scene_set: str, scene_id: int) -> NDArray[np.float64]:
     return rng.permutation(quarters) + rng.uniform(-0.25, 0.25, (4, 2))
 
 
-def nearest_target(scene_set: str, scene_id: int) -> int:
-    """Return the spot nearest to the middle, where the disc starts."""
-    return int(np.argmin(np.linalg.norm(draw_spots(scene_set, scene_id), axis=1)))
+def nearest_target(settings: TaskSettings, scene_id: int, stage: int) -> int:
+    """Return the spot nearest to the middle, where the disc starts; this task has no stages."""
+    return int(np.argmin(np.linalg.norm(draw_spots(settings.scene_set, scene_id), axis=1)))
 
 
 class Table:

@@ -12,7 +12,16 @@ from lerobot_excav.envs.configs.provenance import package_versions
 def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
     """Play an episode again; return the first deviation beyond tolerance in words, or an empty text."""
     spec = recorded.spec
-    played = play_again(spec, recorded.action, recorded.pair, recorded.schedule, fps=fps, columns=recorded.settings)
+    played = play_again(
+        spec,
+        recorded.action,
+        recorded.pair,
+        recorded.schedule,
+        fps=fps,
+        columns=recorded.settings,
+        # The operator's rest may have been cut off, and a success is final only after it.
+        then_hold=spec.cuts_rest and recorded.success,
+    )
     largest, frame = state_deviation(played, recorded)
     if largest > STATE_TOLERANCE:
         return (

@@ -126,8 +126,7 @@ def require_recorded_targets(root: Path, session: dict[int, SessionEpisode]) -> 
             if not envs or envs[-1][0] != settings:
                 env = stack.enter_context(closing(make_environment(settings, with_images=True)))
                 envs.append((settings, env))
-            options = {"scene_id": episode.pair.scene_id, "target_id": episode.pair.target_id}
-            observation, _ = envs[-1][1].reset(options=options)
+            observation, _ = envs[-1][1].reset(options=dict(episode.pair.reset_options))
             if not _same_mask(recorded.image(MASK_KEY, 0), observation["pixels"]["target_mask"]):
                 raise DatasetError(
                     f"episode {recorded.index} does not show the target mask of {episode.pair.uid}, "

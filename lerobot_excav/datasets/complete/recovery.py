@@ -124,7 +124,8 @@ def played_frames(
     """
     number = 0
     for run in episode.runs:
-        options = {"scene_id": run.scene_id, "target_id": run.target_id, "commands": run.schedule}
+        start = {"scene_id": run.scene_id, "stage": run.stage, "target_id": run.target_id}
+        options = {**start, "commands": run.schedule}
         observation = env.reset(options=options)[0]
         for frame in run.frames:
             deviation = np.abs(observation["agent_pos"] - np.array(frame.state, np.float32)).max()

@@ -30,12 +30,14 @@ class Run:
 
     Attributes:
         scene_id: Scene.
+        stage: Cycles dug before the start.
         target_id: Target that is commanded first.
         frames: What LeRobot recorded, in order; only the last may be a restart, whose action was not carried out.
         changes: Changes of the command, as pairs of the number of actions before and the target.
     """
 
     scene_id: int
+    stage: int
     target_id: int
     frames: list[ActionEvent | RestartEvent] = field(default_factory=list)
     changes: list[tuple[int, int]] = field(default_factory=list)
@@ -93,8 +95,9 @@ class SessionEpisode:
 
     @property
     def pair(self) -> Pair:
-        """Scene and first target."""
-        return Pair(self.env, self.task_settings.scene_set, self.runs[0].scene_id, self.runs[0].target_id)
+        """Start and first target."""
+        first = self.runs[0]
+        return Pair(self.env, self.task_settings.scene_set, first.scene_id, first.stage, first.target_id)
 
     @property
     def schedule(self) -> Schedule:
@@ -126,6 +129,10 @@ def read_session(path: Path) -> dict[int, SessionEpisode]:
     return reader.episodes
 
 
+def _run(event: EpisodeEvent | RestartEvent) -> Run:
+    return Run(scene_id=event.scene_id, stage=event.stage, target_id=event.target_id)
+
+
 class _Reader:
     """Puts events together."""
 
@@ -154,10 +161,9 @@ class _Reader:
     def _begin(self, event: EpisodeEvent, place: str) -> None:
         require(self._session is not None, "an episode begins before the line of its session")
         assert self._session is not None
-        start = Run(scene_id=event.scene_id, target_id=event.target_id)
-        index = event.episode_index
+        start, index = _run(event), event.episode_index
         self._last = SessionEpisode(episode_index=index, place=place, session=self._session, runs=[start])
-        self._require_target(event.target_id, self._last)
+        self._require_start(event, self._last)
         self.episodes = {i: episode for i, episode in self.episodes.items() if i < index} | {index: self._last}
 
     @staticmethod
@@ -183,11 +189,11 @@ class _Reader:
                 checked_schedule(run.changes, episode.spec.target_count, run.actions + 1)
             case RestartEvent():
                 episode.restarts.append(episode.frames)
-                self._require_target(event.target_id, episode)
+                self._require_start(event, episode)
                 if event.state is not None and event.action is not None:
                     self._require_values(event, episode)
                     run.frames.append(event)
-                episode.runs.append(Run(scene_id=event.scene_id, target_id=event.target_id))
+                episode.runs.append(_run(event))
 
     def _episode(self, event: Event) -> SessionEpisode:
         require(self._last is not None, f"event={event.event!r} comes before the line of its episode")
@@ -200,8 +206,9 @@ class _Reader:
         return episode
 
     @staticmethod
-    def _require_target(target_id: int, episode: SessionEpisode) -> None:
-        require_integer("target_id", target_id, 0, episode.spec.target_count - 1)
+    def _require_start(event: EpisodeEvent | RestartEvent, episode: SessionEpisode) -> None:
+        require_integer("target_id", event.target_id, 0, episode.spec.target_count - 1)
+        require_integer("stage", event.stage, 0, episode.spec.last_stage)
 
     @staticmethod
     def _require_values(event: ActionEvent | RestartEvent, episode: SessionEpisode) -> None:

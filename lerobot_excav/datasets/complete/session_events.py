@@ -50,6 +50,7 @@ class EpisodeEvent(_Event):
     event: Literal["episode"]
     episode_index: NonNegativeInt
     scene_id: int = Field(ge=0, le=LAST_SCENE)
+    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
     target_id: NonNegativeInt
 
 
@@ -79,6 +80,7 @@ class RestartEvent(_Event):
 
     event: Literal["restart"]
     scene_id: int = Field(ge=0, le=LAST_SCENE)
+    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
     target_id: NonNegativeInt
     state: Vector | None
     action: Vector | None

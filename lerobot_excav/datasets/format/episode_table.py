@@ -114,21 +114,21 @@ class EpisodeTable:
 
     @property
     def pair(self) -> Pair:
-        """Scene, and the target that is commanded first.
+        """Scene, stage, and the target that is commanded first.
 
         Raises:
             DatasetError: The columns contradict each other.
         """
         pair = Pair.parse(self._constant(schema.PAIR_KEY))
-        ids = (self._constant(schema.SCENE_KEY), int(self.target_id[0]))
+        ids = (self._constant(schema.SCENE_KEY), self._constant(schema.STAGE_KEY), int(self.target_id[0]))
         if pair.env != self.robot.env_type:
             raise DatasetError(
                 f"episode {self.index}: {schema.PAIR_KEY}={pair.uid!r} is of {pair.env!r}, but the dataset's "
                 f"robot_type is that of {self.robot.env_type!r}"
             )
-        if ids != (pair.scene_id, pair.target_id):
+        if ids != (pair.scene_id, pair.stage, pair.target_id):
             raise DatasetError(
-                f"episode {self.index}: scene and first target {ids} contradict {schema.PAIR_KEY}={pair.uid!r}"
+                f"episode {self.index}: scene, stage and first target {ids} contradict {schema.PAIR_KEY}={pair.uid!r}"
             )
         return pair
 

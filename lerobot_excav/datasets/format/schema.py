@@ -1,7 +1,7 @@
 """What a frame of a dataset holds, and how an episode names its scene and target.
 
 The keys that `lerobot-record` writes from a simulated robot are described exactly as it describes them, so that
-recorded, scripted and rolled-out data merge. The `excav.*` columns are the truth about scene, target and outcome: they
+recorded, scripted and rolled-out data merge. The `excav.*` columns are the truth about start, target and outcome: they
 are ordinary per-frame columns, the only carrier that survives delete, split, merge and push. The scene set is part of
 `excav.pair_uid`. Target and mask are those in force in that frame: a command may change within an episode, and then
 `excav.pair_uid` names the first.
@@ -20,6 +20,8 @@ STATE_KEY = "observation.state"
 ACTION_KEY = "action"
 MASK_KEY = "observation.images.target_mask"
 SCENE_KEY = "excav.scene_id"
+STAGE_KEY = "excav.stage"
+"""How many cycles a seeded operator had dug before the start; 0 where a task has no stages."""
 TARGET_KEY = "excav.target_id"
 PAIR_KEY = "excav.pair_uid"
 TASK_STATE_KEY = "excav.task_state"
@@ -69,6 +71,7 @@ def excav_features(spec: TaskSpec) -> dict[str, Feature]:
     words = (MASK_SOURCE_KEY, *map(setting_key, spec.settings.columns()))
     return {
         SCENE_KEY: _scalar("int64"),
+        STAGE_KEY: _scalar("int64"),
         TARGET_KEY: _scalar("int64"),
         COMMAND_KEY: _scalar("int64"),
         PAIR_KEY: _scalar("string"),

@@ -68,6 +68,7 @@ def constant_columns(episode: Episode, settings: TaskSettings) -> dict[str, Any]
     """Return the `excav.*` columns that are the same in every frame of an episode played with these settings."""
     return {
         schema.SCENE_KEY: episode.pair.scene_id,
+        schema.STAGE_KEY: episode.pair.stage,
         schema.PAIR_KEY: episode.pair.uid,
         schema.SUCCESS_KEY: episode.success,
         schema.SIMULATION_KEY: task_of_settings(settings).simulation_version,

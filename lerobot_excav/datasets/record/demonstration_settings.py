@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.storage import STORAGES
-from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_scene
+from lerobot_excav.datasets.record.stage_list import parse_stages, stage_list
+from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_start
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -34,7 +35,7 @@ class PlayedScenes:
     first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
     scenes: int = setting("How many scenes", default=50, low=1, high=MOST_SCENES)
     targets: int | None = setting(
-        "Targets shown per scene: 4 pair every scene with every target, 1 shows each scene once; left out: 4, and 1 "
+        "Targets shown per start: 4 pair every scene with every target, 1 shows each scene once; left out: 4, and 1 "
         "with a task that chooses its targets itself",
         default=None,
         choices=tuple(range(1, TARGETS_PER_SCENE + 1)),
@@ -86,26 +87,32 @@ class PlayedScenes:
         """Time limit [frames]."""
         return self.env.episode_length or self.task_spec.length_at(self.env.fps)
 
+    @property
+    def start_stages(self) -> tuple[int, ...]:
+        """The stages that every scene is shown at, rising."""
+        return (0,)
+
     def pairs(self) -> list[Pair]:
-        """Return the episodes to play, in their order."""
-        scene_set, nearest = self.env.scene_set, self.task_spec.nearest_target
+        """Return the episodes to play, in their order: those of a scene side by side, and of a stage within it."""
         return [
-            Pair(self.env.ENV_TYPE, scene_set, scene_id, target_id)
+            Pair(self.env.ENV_TYPE, self.env.scene_set, scene_id, stage, target_id)
             for scene_id in range(self.first_scene, self.first_scene + self.scenes)
-            for target_id in targets_of_scene(
+            for place, stage in enumerate(self.start_stages)
+            for target_id in targets_of_start(
                 self.target_rule,
                 self.targets or 1,  # it has been filled in
                 seed=self.seed,
-                scene_set=scene_set,
+                settings=self.env,
                 scene_id=scene_id,
-                nearest=nearest,
-                default=self.task_spec.default_target,
+                stage=stage,
+                place=place,
             )
         ]
 
-    def episode_seed(self, pair: Pair) -> tuple[int, int, int]:
+    def episode_seed(self, pair: Pair) -> tuple[int, ...]:
         """Return the entropy of the operator's generator in one episode."""
-        return (self.seed, pair.scene_id, pair.target_id)
+        seed = (self.seed, pair.scene_id, pair.target_id)
+        return (*seed, pair.stage) if pair.stage else seed
 
 
 @dataclass(kw_only=True)
@@ -119,10 +126,21 @@ class DemonstrationSettings(PlayedScenes):
         choices=STORAGES,
     )
     keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
+    stages: str = setting(
+        "Stages at which every scene is shown, such as 0,4,8: after so many cycles that a seeded operator has dug "
+        "before. From stage 1 on an episode starts where the last dump has ended",
+        default="0",
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.storage = self.storage or self.task_spec.storage
+        self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
+
+    @property
+    def start_stages(self) -> tuple[int, ...]:
+        """The stages that every scene is shown at, rising."""
+        return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
 
     @classmethod
     def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from PIL import UnidentifiedImageError
@@ -23,8 +24,8 @@ from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.provenance import read_provenance, write_provenance
-from lerobot_excav.datasets.record.simulation import simulate_episode
-from lerobot_excav.datasets.record.workers import episode_result, require_workers, submit_episode, worker_pool
+from lerobot_excav.datasets.record.simulation import simulate_episodes
+from lerobot_excav.datasets.record.workers import episode_results, require_workers, submit_episodes, worker_pool
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import named
 
@@ -37,6 +38,7 @@ class DemonstrationSummary:
         out: The dataset.
         episodes: Episodes in the dataset.
         failures: `pair_uid` of every episode without success.
+        absent: `pair_uid` of every target that its start does not offer.
         waited: `pair_uid` of every episode that is left out because the machine waited for its mask.
         simulated_s: Simulated time of all episodes, kept or not [s].
         wall_s: Time that this call took [s].
@@ -45,6 +47,7 @@ class DemonstrationSummary:
     out: Path
     episodes: int
     failures: list[str]
+    absent: list[str]
     waited: list[str]
     simulated_s: float
     wall_s: float
@@ -82,9 +85,10 @@ def record_demonstrations(
     return DemonstrationSummary(
         out=out,
         episodes=sum(outcome["kept"] for outcome in outcomes),
-        failures=[o["pair_uid"] for o in outcomes if not o["success"] and not o["mask_missing_frames"]],
+        failures=[o["pair_uid"] for o in outcomes if not (o["success"] or o["mask_missing_frames"] or _is_absent(o))],
+        absent=[o["pair_uid"] for o in outcomes if _is_absent(o)],
         waited=[o["pair_uid"] for o in outcomes if o["mask_missing_frames"]],
-        simulated_s=sum(outcome["frames"] for outcome in outcomes) / settings.env.fps,
+        simulated_s=sum(o["metrics"].get("frames", o["frames"]) for o in outcomes) / settings.env.fps,
         wall_s=time.monotonic() - start,
     )
 
@@ -99,13 +103,13 @@ def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: boo
 
 def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
-    pairs = settings.pairs()
+    groups = _groups(settings.pairs())
     with (
         worker_pool(workers) as pool,
-        EpisodeProgress(len(pairs), show=show_progress) as progress,
+        EpisodeProgress(sum(map(len, groups)), show=show_progress) as progress,
         ExitStack() as stack,
     ):
-        futures = {pair: _start(pool, progress, settings, pair, partial.episodes) for pair in pairs}
+        futures = [_start(pool, progress, settings, group, partial.episodes) for group in groups]
         # LeRobot takes seconds to load; by now the workers are at work.
         from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
 
@@ -113,14 +117,17 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
         # Else its threads go on writing into a folder that is given up.
         stack.callback(dataset.writer.stop_image_writer)
         outcomes = []
-        for pair, future in futures.items():
-            outcome = episode_result(pair, future)
-            if outcome["kept"]:
-                episode = EpisodeStore(partial.episodes).read(pair)
-                with _errors_name(partial.dataset):
-                    append_episode(dataset, episode, settings)
-                progress.count_written()
-            outcomes.append(outcome)
+        for group, future in zip(groups, futures, strict=True):
+            episode_results(future)
+            for pair in group:
+                outcome = EpisodeStore(partial.episodes).outcome(pair)
+                assert outcome is not None  # it was just written, or found
+                if outcome["kept"]:
+                    episode = EpisodeStore(partial.episodes).read(pair)
+                    with _errors_name(partial.dataset):
+                        append_episode(dataset, episode, settings)
+                    progress.count_written()
+                outcomes.append(outcome)
     _require_any(outcomes, partial.folder)
     with _errors_name(partial.dataset):
         dataset.finalize()
@@ -146,6 +153,11 @@ def _errors_name(dataset: Path) -> Iterator[None]:
 def _require_any(outcomes: list[Outcome], folder: Path) -> None:
     if any(outcome["kept"] for outcome in outcomes):
         return
+    if all(_is_absent(outcome) for outcome in outcomes):
+        raise DatasetError(
+            f"none of the {len(outcomes)} targets asked for is offered by its start; remove {folder} and choose "
+            "earlier --stages"
+        )
     if waited := sum(outcome["mask_missing_frames"] > 0 for outcome in outcomes):
         raise DatasetError(
             f"in {waited} of {len(outcomes)} episodes the machine waited for its mask, which no replay can repeat, and "
@@ -157,14 +169,26 @@ def _require_any(outcomes: list[Outcome], folder: Path) -> None:
     )
 
 
+def _groups(pairs: list[Pair]) -> list[list[Pair]]:
+    """Return the episodes that one process plays: one by one, or all of a scene, whose stages it reaches only once."""
+    if all(pair.stage == 0 for pair in pairs):
+        return [[pair] for pair in pairs]
+    return [list(scene) for _, scene in groupby(pairs, key=lambda pair: pair.scene_id)]
+
+
 def _start(
-    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, pair: Pair, folder: Path
-) -> Future[Outcome]:
-    """Submit an episode, unless it is finished already."""
-    finished = EpisodeStore(folder).outcome(pair)
-    if finished is not None:
+    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, group: list[Pair], folder: Path
+) -> Future[list[Outcome]]:
+    """Submit those episodes of a group that are not finished already."""
+    missing = [pair for pair in group if EpisodeStore(folder).outcome(pair) is None]
+    for _ in range(len(group) - len(missing)):
         progress.skip()
-        future: Future[Outcome] = Future()
-        future.set_result(finished)
+    if not missing:
+        future: Future[list[Outcome]] = Future()
+        future.set_result([])
         return future
-    return submit_episode(pool, progress, simulate_episode, settings, pair, folder)
+    return submit_episodes(pool, progress, simulate_episodes, settings, missing, folder)
+
+
+def _is_absent(outcome: Outcome) -> bool:
+    return outcome.get("absent", False)

@@ -1,7 +1,7 @@
 """One played episode: how it is driven and what is kept of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,16 @@ from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import Operator
 
+TRACES = ("state", "action", "target_id", "command_frame", "task_state")
+"""What an episode holds of every frame, besides pictures."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Episode:
     """What was seen and done, frame by frame; everything is taken just before the frame's action.
 
     Attributes:
-        pair: Scene and the target that is commanded first.
+        pair: Start and the target that is commanded first.
         task: Task description.
         images: By camera, (n, H, W, 3) uint8; empty when the environment shows none.
         state: What the policy feels of the machine, (n, s) float32; names and units as its environment has them.
@@ -50,25 +53,45 @@ class Episode:
 
 
 def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) -> Episode:
-    """Reset an environment to a pair's scene and target, then the operator, and let it play to the end."""
-    options = {"scene_id": pair.scene_id, "target_id": pair.target_id}
-    return _play(env, pair, options, reset=lambda: operator.reset(env), act=lambda _: operator.act(env))
+    """Reset an environment to a pair's start and target, then the operator, and let it play to the end.
+
+    Where the task says so, the last frames, in which the operator rests, are played but not returned.
+    """
+    rests: list[bool] = []
+
+    def act(_: int) -> NDArray[Any]:
+        action = operator.act(env)
+        rests.append(env.task_spec.cuts_rest and bool(operator.done))  # type: ignore[attr-defined]  # see Operator
+        return action
+
+    episode = _play(env, pair, dict(pair.reset_options), reset=lambda: operator.reset(env), act=act)
+    at_work = [frame for frame, is_rest in enumerate(rests) if not is_rest]
+    return _first_frames(episode, 1 + max(at_work, default=0))
 
 
-def replay(env: MaskedTaskEnv[Any, Any], action: NDArray[Any], pair: Pair, schedule: Schedule) -> Episode:
+def replay(
+    env: MaskedTaskEnv[Any, Any], action: NDArray[Any], pair: Pair, schedule: Schedule, *, then_hold: bool = False
+) -> Episode:
     """Play recorded actions again, all of them: a person may go on after the environment says that it is over.
 
     Args:
-        env: Environment; it is reset to the pair's scene and target.
+        env: Environment; it is reset to the pair's start and target.
         action: Actions, (n, a) float32.
-        pair: Scene and target.
+        pair: Start and target.
         schedule: Changes of the command.
+        then_hold: Whether the machine is held still after them until the environment says that it is over.
 
     Returns:
-        The episode. Its `metrics` are empty unless the environment said that it is over.
+        The episode, without the frames in which the machine was held. Its `metrics` are empty unless the environment
+        said that it is over.
     """
-    options = {"scene_id": pair.scene_id, "target_id": pair.target_id, "commands": schedule}
-    return _play(env, pair, options, reset=lambda: None, act=lambda frame: action[frame], length=len(action))
+    options = {**pair.reset_options, "commands": schedule}
+
+    def act(frame: int) -> NDArray[Any]:
+        return np.asarray(action[frame] if frame < len(action) else env.holding_action())
+
+    episode = _play(env, pair, options, reset=lambda: None, act=act, least=len(action), goes_on=then_hold)
+    return _first_frames(episode, len(action))
 
 
 def _play(
@@ -78,15 +101,16 @@ def _play(
     *,
     reset: Callable[[], None],
     act: Callable[[int], NDArray[Any]],
-    length: int | None = None,
+    least: int = 0,
+    goes_on: bool = True,
 ) -> Episode:
-    """Play `length` frames, or by default until the episode ends."""
+    """Play the least number of frames, and go on until the episode ends."""
     observation, info = env.reset(options=options)
     reset()
     frames: list[dict[str, Any]] = []
     metrics: dict[str, Any] = {}
     success, ended = False, False
-    while (not ended) if length is None else len(frames) < length:
+    while len(frames) < least or (goes_on and not ended):
         action = np.asarray(act(len(frames)), dtype=np.float32)
         frames.append(_frame(observation, info, action))
         observation, _, terminated, truncated, info = env.step(action)
@@ -104,6 +128,13 @@ def _play(
         metrics=dict(metrics),
         **columns,
     )
+
+
+def _first_frames(episode: Episode, count: int) -> Episode:
+    """Return an episode cut off after some frames; its outcome stays."""
+    traces = {name: getattr(episode, name)[:count] for name in TRACES}
+    images = {camera: frames[:count] for camera, frames in episode.images.items()}
+    return replace(episode, images=images, **traces)
 
 
 def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,12 @@ from pydantic import ConfigDict, TypeAdapter, with_config
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.reading import reading
-from lerobot_excav.datasets.record.episode import Episode
+from lerobot_excav.datasets.record.episode import TRACES, Episode
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import unfinished, write_whole
 
 # Only a stopover: LeRobot compresses again, so speed counts here (level 1 takes a third of level 6's time).
 PNG_LEVEL = 1
-
-
-TRACES = ("state", "action", "target_id", "command_frame", "task_state")
 
 
 @with_config(ConfigDict(extra="allow"))
@@ -39,6 +36,7 @@ class Outcome(TypedDict):
     kept: bool
     mask_missing_frames: int
     metrics: dict[str, Any]
+    absent: NotRequired[bool]  # whether the start offers no such target, so that nothing was played
 
 
 _OUTCOME = TypeAdapter(Outcome)
@@ -67,6 +65,20 @@ class EpisodeStore:
             write_whole(self._path(episode.pair, "npz"), buffer.getbuffer())
         write_whole(self._path(episode.pair, "json"), json.dumps(outcome))
         return outcome
+
+    def write_absent(self, pair: Pair) -> Outcome:
+        """Note that a start offers no such target; return the outcome that was written."""
+        nothing: Outcome = {
+            "pair_uid": pair.uid,
+            "success": False,
+            "frames": 0,
+            "kept": False,
+            "mask_missing_frames": 0,
+            "metrics": {},
+            "absent": True,
+        }
+        write_whole(self._path(pair, "json"), json.dumps(nothing))
+        return nothing
 
     def outcome(self, pair: Pair) -> Outcome | None:
         """Return the outcome of an episode, or None if it is not finished.

@@ -3,7 +3,7 @@
 Workers load this module and what it imports; LeRobot, which takes seconds and a gigabyte per process, is not among it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,33 @@ from lerobot_excav.datasets.record.episode import Episode, demonstrate, replay
 from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
-from lerobot_excav.envs.tasks.selection import Schedule
+from lerobot_excav.envs.tasks.selection import Schedule, TargetAbsentError
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.errors import ExcavError
+
+
+def simulate_episodes(settings: DemonstrationSettings, pairs: Sequence[Pair], folder: Path) -> list[Outcome]:
+    """Play episodes one after the other, as `simulate_episode` does, and return their outcomes; runs in a worker.
+
+    Raises:
+        ExcavError: One could not be played; the message names it.
+    """
+    outcomes = []
+    for pair in pairs:
+        try:
+            outcomes.append(simulate_episode(settings, pair, folder))
+        except ExcavError as error:
+            raise ExcavError(f"{pair.uid}: {error}") from error
+    return outcomes
 
 
 def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
-    """Play one episode, store it in the folder of finished ones, and return its outcome; runs in a worker."""
-    episode = play_demonstration(settings, pair)
+    """Play one episode, store it in the folder of finished ones, and return its outcome; note it if there is none."""
+    try:
+        episode = play_demonstration(settings, pair)
+    except TargetAbsentError:
+        return EpisodeStore(folder).write_absent(pair)
     # An episode that waited for its mask has frames that no action led to: it could not be played again.
     keep = (episode.success or settings.keep_failures) and episode.mask_missing_frames == 0
     return EpisodeStore(folder).write(episode, keep_frames=keep)
@@ -51,22 +70,30 @@ def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTask
 
 
 def play_again(
-    spec: TaskSpec, action: NDArray[Any], pair: Pair, schedule: Schedule, *, fps: int, columns: Mapping[str, str]
+    spec: TaskSpec,
+    action: NDArray[Any],
+    pair: Pair,
+    schedule: Schedule,
+    *,
+    fps: int,
+    columns: Mapping[str, str],
+    then_hold: bool = False,
 ) -> Episode:
     """Play the recorded actions of an episode (n, a) again, without pictures and with its own commands.
 
     Args:
         spec: The task.
         action: Actions.
-        pair: Scene and first target.
+        pair: Start and first target.
         schedule: Changes of the command.
         fps: Frames per second.
         columns: Settings that datasets keep in every frame, by name.
+        then_hold: Whether the machine is then held still until the task is over, at most for its time limit.
     """
-    length = spec.replay_length(len(action))
+    length = len(action) + spec.length_at(fps) if then_hold else spec.replay_length(len(action))
     settings = spec.make_settings(scene_set=pair.scene_set, fps=fps, episode_length=length, **columns)
     with closing(make_environment(settings, with_images=False)) as env:
-        return replay(env, action, pair, schedule)
+        return replay(env, action, pair, schedule, then_hold=then_hold)
 
 
 _open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []

@@ -1,10 +1,9 @@
-"""Which targets a scene is shown with."""
-
-from collections.abc import Callable
+"""Which targets a start is shown with."""
 
 import numpy as np
 
-from lerobot_excav.envs.tasks.settings import SCENE_SETS, TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.settings import SCENE_SETS, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.errors import require_choice
 
 TARGET_RULES = ("round", "uniform", "nearest")
@@ -13,36 +12,31 @@ TARGET_RULES = ("round", "uniform", "nearest")
 _STREAM = 0x7A26
 
 
-def targets_of_scene(
-    rule: str,
-    count: int,
-    *,
-    seed: int,
-    scene_set: str,
-    scene_id: int,
-    nearest: Callable[[str, int], int],
-    default: int | None = None,
+def targets_of_start(
+    rule: str, count: int, *, seed: int, settings: TaskSettings, scene_id: int, stage: int = 0, place: int = 0
 ) -> list[int]:
-    """Return the targets that a scene is shown with.
+    """Return the targets that a start is shown with.
 
     Args:
-        rule: `round` goes round the targets from scene to scene, so that all are equally frequent; `uniform` draws one,
-            whatever other scenes are drawn for; `nearest` takes that one.
+        rule: `round` goes round the targets from start to start, so that all are equally frequent; `uniform` draws one,
+            whatever other starts are drawn for; `nearest` takes the one that the task tells as the nearest.
         count: How many; the latter two choose one.
         seed: Seed of `uniform`.
-        scene_set: Scene set.
+        settings: Settings of the environment; its task may have a target with which `round` begins in every scene.
         scene_id: Scene.
-        nearest: Returns the nearest target of a scene.
-        default: Target with which `round` begins in every scene, where a task has one.
+        stage: Cycles dug before the start.
+        place: Place of the stage among those at which a scene is shown.
 
     Raises:
         ConfigurationError: There is no such rule.
     """
     require_choice("target_rule", rule, TARGET_RULES)
+    spec = task_of_settings(settings)
     if rule == "uniform":
-        rng = np.random.default_rng((_STREAM, seed, SCENE_SETS.index(scene_set), scene_id))
+        start = (SCENE_SETS.index(settings.scene_set), scene_id)
+        rng = np.random.default_rng((_STREAM, seed, *start, stage) if stage else (_STREAM, seed, *start))
         return [int(rng.integers(TARGETS_PER_SCENE))]
     if rule == "nearest":
-        return [nearest(scene_set, scene_id)]
-    first = scene_id if default is None else default
+        return [spec.nearest_target(settings, scene_id, stage)]
+    first = scene_id + place if spec.default_target is None else spec.default_target
     return sorted((first + k) % TARGETS_PER_SCENE for k in range(count))

@@ -10,7 +10,6 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any
 
-from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.errors import ExcavError, require_integer
 
@@ -60,25 +59,32 @@ def worker_pool(workers: int) -> Iterator[Executor]:
                 os.environ[name] = value
 
 
-def submit_episode[Result: Mapping[str, object]](
-    pool: Executor, progress: EpisodeProgress, play: Callable[..., Result], *arguments: Any
-) -> Future[Result]:
-    """Submit an episode to a pool, to be counted when done; `play` returns its outcome with an entry `success`."""
+def submit_episodes[Result: Mapping[str, Any]](
+    pool: Executor, progress: EpisodeProgress, play: Callable[..., list[Result]], *arguments: Any
+) -> Future[list[Result]]:
+    """Submit episodes to a pool, for one process and to be counted when done; `play` returns their outcomes.
 
-    def count(future: Future[Result]) -> None:
+    An outcome has an entry `success`; one with `absent` was not played.
+    """
+
+    def count(future: Future[list[Result]]) -> None:
         if not future.cancelled() and future.exception() is None:
-            progress.count(success=bool(future.result()["success"]))
+            for outcome in future.result():
+                if outcome.get("absent", False):
+                    progress.skip()
+                else:
+                    progress.count(success=bool(outcome["success"]))
 
     future = pool.submit(play, *arguments)
     future.add_done_callback(count)
     return future
 
 
-def episode_result[Result: Mapping[str, object]](pair: Pair, future: Future[Result]) -> Result:
-    """Wait for the outcome of an episode.
+def episode_results[Result](future: Future[list[Result]]) -> list[Result]:
+    """Wait for the outcomes of episodes.
 
     Raises:
-        ExcavError: A worker died, or the episode failed; the message names it.
+        ExcavError: A worker died, or an episode could not be played; the message names it.
     """
     try:
         return future.result()
@@ -86,8 +92,6 @@ def episode_result[Result: Mapping[str, object]](pair: Pair, future: Future[Resu
         raise ExcavError(
             "a worker process died (out of memory?); go on with --resume=true, perhaps with fewer --workers"
         ) from error
-    except ExcavError as error:
-        raise ExcavError(f"{pair.uid}: {error}") from error
 
 
 class InProcessExecutor(Executor):

@@ -122,7 +122,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         """
 
     @abstractmethod
-    def _holding_action(self) -> NDArray[Any]:
+    def holding_action(self) -> NDArray[Any]:
         """Return the action that holds the machine still."""
 
     @abstractmethod
@@ -260,8 +260,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         frames = self._frame + self._missing_frames
         truncated = (self.mask_missing or frames >= self.episode_length) and not terminated
         self._is_over = terminated or truncated
-        info = self._info(is_over=self._is_over)
-        return self._observe(), float(reward), terminated, truncated, info
+        return self._observe(), float(reward), terminated, truncated, self._info(is_over=self._is_over)
 
     def close(self) -> None:
         """Free the graphics contexts."""
@@ -327,9 +326,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         reward, terminated, left = 0.0, False, self.episode_length - self._frame - self._missing_frames
         patience = min(left, round(MASK_MISSING_LIMIT_S * self.fps))
         while self.mask_missing and not terminated and patience > 0:
-            gain, terminated = self._advance(self._holding_action())
-            reward += gain
-            patience -= 1
+            gain, terminated = self._advance(self.holding_action())
+            reward, patience = reward + gain, patience - 1
             self._missing_frames += 1
             self._main_img = None
             self._mask = self._source.mask(self, self.command)
@@ -365,6 +363,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             "is_success": is_over and self.is_success,
             "task_state": self.task_state,
             "scene_id": self.scene_id,
+            "stage": self.stage,
             "target_id": self.target_id,
             "command_frame": self.command.since_frame,
             "mask_missing": self.mask_missing,
@@ -383,6 +382,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             **{name: value for name, value in self.settings.as_dict().items() if value is not None},
             "episode_length": self.episode_length,
             "scene_id": self.scene_id,
+            "stage": self.stage,
             "target_id": self._commands[0].target_id,
             "commands": [[command.since_frame, command.target_id] for command in self._commands],
             "shown_target_id": NO_TARGET if shown is None else shown,

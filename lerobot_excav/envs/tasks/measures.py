@@ -28,10 +28,11 @@ class EpisodeKey(NamedTuple):
 
     scene_set: str
     scene_id: int
+    stage: int
     target_id: int
 
     def __str__(self) -> str:
-        return f"{self.scene_set}/{self.scene_id}/{self.target_id}"
+        return f"{self.scene_set}/{self.scene_id}/{self.stage}/{self.target_id}"
 
 
 def one_of(allowed: Collection[Any]) -> AfterValidator:
@@ -70,6 +71,7 @@ class EpisodeRecord(BaseModel):
     episode_length: PositiveInt
     scene_set: Annotated[str, one_of(SCENE_SETS)]
     scene_id: int = Field(ge=0, le=LAST_SCENE)
+    stage: int = Field(default=0, ge=0)  # cycles dug before the start; files of earlier releases hold stage 0 only
     target_id: TargetId  # commanded first
     mask_source: str
     mask_condition: Annotated[str, one_of(MASK_CONDITIONS)]
@@ -95,8 +97,8 @@ class EpisodeRecord(BaseModel):
 
     @property
     def key(self) -> EpisodeKey:
-        """Scene and first target."""
-        return EpisodeKey(self.scene_set, self.scene_id, self.target_id)
+        """Scene, stage and first target."""
+        return EpisodeKey(self.scene_set, self.scene_id, self.stage, self.target_id)
 
     @property
     def final_target_id(self) -> int:

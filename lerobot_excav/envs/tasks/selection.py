@@ -7,12 +7,16 @@ from typing import Any
 import numpy as np
 
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import require, require_choice, require_integer
+from lerobot_excav.errors import ConfigurationError, require, require_choice, require_integer
 
 RESET_OPTIONS = ("scene_id", "target_id", "stage", "commands")
 
 Schedule = tuple[tuple[int, int], ...]
 """Changes of the command: after how many actions which target is commanded."""
+
+
+class TargetAbsentError(ConfigurationError):
+    """A start offers no target of this number: late stages of a scene, for instance, may have fewer."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ what the pictures would show, as numbers: for reinforcement learning."""
 
 
 class Operator(Protocol):
-    """A scripted operator of a task."""
+    """A scripted operator of a task; with `cuts_rest` it also has `done`: whether the work is over and it rests."""
 
     def reset(self, env: Any) -> None:
         """Look at a freshly reset environment of the task."""
@@ -59,14 +59,16 @@ class TaskSpec:
         env_entry: Class of the environment, a `MaskedTaskEnv`.
         operator_entry: Class of the scripted operator, an `Operator` made with `rng`.
         measures_entry: The `TaskMeasures`.
-        nearest_target_entry: Function from scene set and scene to the target that is nearest at the start; None if the
-            task defines no such thing.
+        nearest_target_entry: Function from settings, scene and stage to the target that is nearest at the start, as
+            the task understands it; None if the task defines no such thing.
         task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
         target_count: Targets of a scene.
         default_target: Target that is commanded first unless options of `reset` say otherwise; None if a scene is shown
             with all of them in turn.
         last_stage: How many cycles a seeded operator may have dug before the start; 0 if scenes have no stages.
+        cuts_rest: Whether demonstrations end with the operator's last action: frames in which it rests until the
+            environment says that the task is over are left out, and a replay holds the machine still for as long.
     """
 
     id: str
@@ -94,6 +96,7 @@ class TaskSpec:
     target_count: int = TARGETS_PER_SCENE
     default_target: int | None = None
     last_stage: int = 0
+    cuts_rest: bool = False
 
     @property
     def env_type(self) -> str:
@@ -124,10 +127,10 @@ class TaskSpec:
         operator: Operator = resolve_name(self.operator_entry)(rng=rng)
         return operator
 
-    def nearest_target(self, scene_set: str, scene_id: int) -> int:
-        """Return the target of a scene that is nearest at the start."""
+    def nearest_target(self, settings: TaskSettings, scene_id: int, stage: int = 0) -> int:
+        """Return the target that is nearest at the start of a scene, at a stage."""
         assert self.nearest_target_entry is not None  # what offers the choice checks it
-        return int(resolve_name(self.nearest_target_entry)(scene_set, scene_id))
+        return int(resolve_name(self.nearest_target_entry)(settings, scene_id, stage))
 
     def observation_space(self, obs_type: str, size: tuple[int, int]) -> gym.spaces.Dict:
         """Return the space of observations of one of `OBS_TYPES`; pictures are (height, width) [px]."""

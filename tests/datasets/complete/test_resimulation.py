@@ -166,8 +166,8 @@ def test_a_deviating_resimulation_names_episode_and_frame_and_leaves_no_trace(
     [
         ({"settings": {"fps": 5}}, "episode 1: the robot ran at 5 frames/s, the dataset has 10"),
         ({"frames": 5}, r"episode 1 has 8 frames, but the session noted 5 .* edited after recording"),
-        ({"target_id": 2}, r"episode 1 does not show the target mask of toy_reach/train/0/2"),
-        ({"scene_id": 4}, r"episode 1 does not show the target mask of toy_reach/train/4/1"),
+        ({"target_id": 2}, r"episode 1 does not show the target mask of toy_reach/train/0/0/2"),
+        ({"scene_id": 4}, r"episode 1 does not show the target mask of toy_reach/train/4/0/1"),
         ({"settings": {"observation_height": 64}}, r"episode 1 does not show the target mask"),
         ({"settings": {"table": "ice"}}, r"episode 1: the re-simulation of .* at frame 1"),
         ({"simulation_version": 7}, r"episodes 1 of version 7 of the simulation cannot be replayed"),
@@ -198,7 +198,7 @@ def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, s
 
 def test_a_recording_edited_before_indexing_is_refused(recording, recorded, tmp_path):
     delete_episodes(load(recording), [0], output_dir=tmp_path / "edited", repo_id="local/edited")
-    with pytest.raises(DatasetError, match=r"episode 0 .* toy_reach/train/0/0.*Index first, edit afterwards"):
+    with pytest.raises(DatasetError, match=r"episode 0 .* toy_reach/train/0/0/0.*Index first, edit afterwards"):
         complete_recording(tmp_path / "edited", recorded[1])
     assert PAIR_KEY not in (tmp_path / "edited" / "meta" / "info.json").read_text()
 

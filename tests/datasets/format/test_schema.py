@@ -112,7 +112,7 @@ def test_columns_of_another_task_are_refused():
 
 def test_pair_uid_reads_back():
     pair = Pair("excavator", "test", 12, 3)
-    assert pair.uid == "excavator/test/12/3"
+    assert pair.uid == "excavator/test/12/0/3"
     assert Pair.parse(pair.uid) == pair
 
 

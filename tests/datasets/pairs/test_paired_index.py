@@ -27,7 +27,7 @@ def test_the_index_describes_every_episode(paired_dataset):
     assert index["episode_index"].tolist() == list(range(19))
     row = index.iloc[6]
     expected = {
-        "pair_uid": "toy_reach/train/1/2",
+        "pair_uid": "toy_reach/train/1/0/2",
         "scene_set": "train",
         "scene_id": 1,
         "target_id": 2,
@@ -52,7 +52,7 @@ def test_missing_and_duplicate_targets_are_found(paired_dataset):
     assert coverage.missing == {"toy_reach/train/3": [1]}
     assert coverage.duplicates == {}
     twice = pd.concat([index, index.iloc[[2]].assign(episode_index=19)])
-    assert pair_coverage(twice).duplicates == {"toy_reach/train/0/2": [2, 19]}
+    assert pair_coverage(twice).duplicates == {"toy_reach/train/0/0/2": [2, 19]}
 
 
 def test_verdicts_follow_their_episode_when_episodes_are_deleted(paired_dataset, tmp_path):

@@ -16,7 +16,7 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
     rows = [
         {
             "episode_index": number,
-            "pair_uid": f"excavator/train/{scene}/{target}",
+            "pair_uid": f"excavator/train/{scene}/0/{target}",
             "env": "excavator",
             "scene_set": "train",
             "task": "Reach-v0",
@@ -132,4 +132,4 @@ def test_a_scene_on_another_soil_is_another_start_but_held_out_with_it():
 def test_where_no_setting_changes_the_start_scenes_are_paired_by_number_alone():
     index = index_of([(0, 0), (0, 1), (1, 0), (1, 1), (0, 1)], env="fr5_grasp").drop(columns="soil")
     assert len(select(usable(index), "paired")) == 4
-    assert pair_coverage(index).duplicates == {"excavator/train/0/1": [1, 4]}
+    assert pair_coverage(index).duplicates == {"excavator/train/0/0/1": [1, 4]}

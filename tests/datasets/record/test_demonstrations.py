@@ -43,7 +43,7 @@ def test_frames_read_back_as_they_were_played(request, paired_dataset, changing_
         np.testing.assert_array_equal(item["action"], episode.action[frame])
         np.testing.assert_array_equal(item["excav.task_state"], episode.task_state[frame])
         assert int(item["excav.target_id"]) == episode.target_id[frame]
-        assert item["excav.pair_uid"] == episode.pair.uid == "toy_reach/train/1/1"
+        assert item["excav.pair_uid"] == episode.pair.uid == "toy_reach/train/1/0/1"
         assert (item["excav.table"], item["excav.mask_source"]) == ("wood", "oracle")
         assert int(item["excav.scene_id"]) == 1
         assert bool(item["excav.success"])
@@ -110,7 +110,7 @@ def test_after_a_full_disk_a_run_continues_and_nothing_that_was_finished_is_play
 def test_failed_episodes_are_listed_and_kept_on_request_only(tmp_path, keep):
     summary = record_toy(tmp_path / "d", first_scene=3, scenes=1, keep_failures=keep)
     assert summary.episodes == 3 + keep
-    assert summary.failures == ["toy_reach/train/3/1"]
+    assert summary.failures == ["toy_reach/train/3/0/1"]
     assert [outcome["kept"] for outcome in read_provenance(tmp_path / "d").outcomes] == [True, keep, True, True]
     assert build_index(tmp_path / "d")["success"].tolist() == [True, *[False] * keep, True, True]
 
@@ -127,7 +127,7 @@ def hide(monkeypatch, *targets):
 def test_an_episode_whose_mask_is_missing_is_never_kept(tmp_path, monkeypatch):
     hide(monkeypatch, 2)
     summary = record_toy(tmp_path / "d", scenes=1, keep_failures=True)
-    assert (summary.episodes, summary.failures, summary.waited) == (3, [], ["toy_reach/train/0/2"])
+    assert (summary.episodes, summary.failures, summary.waited) == (3, [], ["toy_reach/train/0/0/2"])
     outcome = read_provenance(tmp_path / "d").outcomes[2]
     assert outcome["mask_missing_frames"] > 0
     assert not outcome["kept"]
@@ -158,7 +158,7 @@ def test_a_finished_dataset_is_neither_overwritten_nor_changed(paired_dataset):
 
 def test_a_started_run_is_neither_resumed_unasked_nor_with_another_setting(tmp_path):
     with PartialRun(tmp_path / "d", toy_settings(), resume=False) as started:
-        (started.episodes / "toy_reach-train-0-0.npz").write_bytes(b"torn")
+        (started.episodes / "toy_reach-train-0-0-0.npz").write_bytes(b"torn")
         assert EpisodeStore(started.episodes).outcome(toy_settings().pairs()[0]) is None
         with pytest.raises(DatasetError, match="another process"):
             record_toy(tmp_path / "d", resume=True)

@@ -61,7 +61,7 @@ def test_beside_a_finished_dataset_a_folder_of_somebody_else_is_kept(paired_data
 def test_beside_a_finished_dataset_only_its_own_run_is_tidied_up(paired_dataset, tmp_path, seed, is_kept):
     shutil.copytree(paired_dataset, tmp_path / "v")
     with partial_run(tmp_path / "v", scenes=5, seed=seed) as run:
-        (run.episodes / "toy_reach-train-0-0.json").write_text("{}")
+        (run.episodes / "toy_reach-train-0-0-0.json").write_text("{}")
     record_toy(tmp_path / "v", scenes=5, resume=True)
     assert (tmp_path / "v.partial").exists() == is_kept
 

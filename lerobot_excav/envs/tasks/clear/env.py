@@ -17,7 +17,8 @@ from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
-from lerobot_excav.errors import require
+from lerobot_excav.envs.tasks.selection import TargetAbsentError
+from lerobot_excav.errors import ConfigurationError, require
 
 PLANNER_PICTURE_PX = (192, 256)
 """Height and width of the planner's depth picture [px], whatever policies see: 96 % of the cells with soil are seen,
@@ -76,11 +77,11 @@ class ClearEnv(ExcavatorEnv):
         self.worksite.reset(self._scene)
         self._clearing = Clearing(self.worksite)
         self._look()
-        require(
-            self.plan.nothing_left is None,
-            f"scene_id={scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another scene, or other "
-            f"zones than keep_out={self._excavator_settings.keep_out!r}",
-        )
+        if self.plan.nothing_left is not None:
+            raise (TargetAbsentError if self.stage else ConfigurationError)(
+                f"scene_id={scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another scene, or other "
+                f"zones than keep_out={self._excavator_settings.keep_out!r}"
+            )
         self._begin_cycle(target_id)
 
     @override
@@ -113,11 +114,11 @@ class ClearEnv(ExcavatorEnv):
 
     def _begin_cycle(self, target_id: int) -> None:
         count = len(self.plan.proposals)
-        require(
-            target_id < count,
-            f"target_id={target_id} is not possible: the planner proposes {count} regions here; give one from 0 to "
-            f"{count - 1}, or leave it out",
-        )
+        if target_id >= count:
+            raise TargetAbsentError(
+                f"target_id={target_id} is not possible: the planner proposes {count} regions here; give one from 0 to "
+                f"{count - 1}, or leave it out"
+            )
         scene = replace(self._scene, targets=self.plan.targets)
         self._cycle = DigCycle(self.worksite, scene, target_id)
         self._clearing.begin(self._cycle, self.plan.proposals[target_id])
@@ -143,11 +144,6 @@ class ClearEnv(ExcavatorEnv):
         else:
             require(target_id < self._target_count, f"commands: target {target_id} is not proposed at this time")
             self._clearing.recommand(target_id, self.plan.proposals[target_id])
-
-    @property
-    @override
-    def _target_count(self) -> int:
-        return len(self.scene.targets)
 
     @property
     @override

@@ -19,4 +19,5 @@ CLEAR = replace(
     measures_entry="lerobot_excav.envs.tasks.clear.measures:CLEAR_MEASURES",
     judges_at_the_end=True,
     default_target=0,
+    cuts_rest=False,
 )

@@ -102,7 +102,8 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
             self.workcell.tick(action)
         return self.grasp.update(), False
 
-    def _holding_action(self) -> NDArray[np.float64]:
+    def holding_action(self) -> NDArray[np.float64]:
+        """Return the action that holds the machine still."""
         # Not `agent_pos`: fingers told to stay where a block stops them would no longer press on it.
         return self.workcell.reference
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.fr5 import constants as const
 from lerobot_excav.envs.machines.fr5.layout import BASE_POS_W
 from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
+from lerobot_excav.envs.tasks.settings import TaskSettings
 
 
 def nearest_block(scene: GraspScene) -> int:
@@ -14,9 +15,9 @@ def nearest_block(scene: GraspScene) -> int:
     return int(np.argmin(np.hypot(*offset_w.T)))
 
 
-def nearest_target(scene_set: str, scene_id: int) -> int:
+def nearest_target(settings: TaskSettings, scene_id: int, stage: int) -> int:
     """Return the target of a scene that is nearest at the start; it is named by its number."""
-    return nearest_block(draw_scene(scene_set, scene_id))
+    return nearest_block(draw_scene(settings.scene_set, scene_id))
 
 
 def grasp_pos_w(joint_pos: NDArray[np.float64]) -> NDArray[np.float64]:

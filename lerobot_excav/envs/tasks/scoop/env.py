@@ -20,6 +20,8 @@ from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
 from lerobot_excav.envs.tasks.scoop.targets import Target
+from lerobot_excav.envs.tasks.selection import TargetAbsentError
+from lerobot_excav.errors import require
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
 FULL_BUCKET_KG = 485.0
@@ -116,6 +118,11 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     def _start(self, scene_id: int, target_id: int) -> None:
         settings = self._excavator_settings
         scene = draw_start(settings.scene_set, scene_id, self.stage, soil=settings.soil, fidelity=settings.fidelity)
+        if target_id >= (count := len(scene.targets)):
+            raise TargetAbsentError(
+                f"target_id={target_id} is not possible: scene {scene_id} has {count} regions at stage {self.stage}; "
+                "give a lower number, or an earlier stage"
+            )
         self.worksite.reset(scene)
         self._cycle = DigCycle(self.worksite, scene, target_id)
 
@@ -128,14 +135,20 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         gain = (cycle.state.deposited_mass_kg - deposited_before_kg) / FULL_BUCKET_KG
         return gain + float(cycle.is_success), cycle.is_complete
 
-    def _holding_action(self) -> NDArray[np.float32]:
+    def holding_action(self) -> NDArray[np.float32]:
+        """Return the action that holds the machine still."""
         return np.zeros(4, np.float32)
 
     def _region(self, target_id: int) -> Target:
         return self.scene.targets[target_id]
 
     def _begin_command(self, target_id: int) -> None:
+        require(target_id < self._target_count, f"commands: there is no target {target_id} at this stage of the scene")
         self.cycle.retarget(target_id)
+
+    @property
+    def _target_count(self) -> int:
+        return len(self.scene.targets)
 
     def true_mask(self, command: Command) -> Pixels:
         """Return the pixels whose soil surface point lies in the patch, (H, W) bool."""

@@ -68,4 +68,5 @@ SCOOP = TaskSpec(
     task_state_tolerance=1e-2,  # [kg], [m], or a count (kind: guess; the same build repeats exactly)
     judges_at_the_end=False,
     last_stage=15,
+    cuts_rest=True,
 )

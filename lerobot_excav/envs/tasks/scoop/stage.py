@@ -62,6 +62,8 @@ def _later_start(
     scene_set: str, scene_id: int, stage: int, soil: str | SoilParameters, fidelity: str, propose: Propose
 ) -> Scene:
     before = draw_start(scene_set, scene_id, stage - 1, soil=soil, fidelity=fidelity, propose=propose)
+    if not before.targets:  # nothing is left to be dug
+        return before
     rehearse()
     worksite = Worksite(soil=soil, fidelity=fidelity)
     worksite.reset(before)

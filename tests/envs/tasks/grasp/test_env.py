@@ -149,7 +149,7 @@ def test_a_held_arm_keeps_the_block_it_has_lifted():
         env.step(operator.act(env))
     heights_m = []
     for _ in range(150):
-        env._advance(env._holding_action())
+        env._advance(env.holding_action())
         heights_m.append(env.workcell.block_pos_w[env.target_id, 2])
     assert min(heights_m) > lifted - 0.005
     assert np.ptp(heights_m[25:]) < 0.001  # the joints catch up with what they were told, then nothing moves
