@@ -23,7 +23,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-fr5 table-manipulation test test-lowest test-long fuzz validate lint type docs wheel clean
+.PHONY: help setup demo tutorial demo-fr5 table-manipulation test test-lowest test-long fuzz validate lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -46,8 +46,11 @@ $(READY): pyproject.toml uv.lock
 	@$(RUN)/lerobot-excav warmup
 	@touch $@
 
-demo: $(READY) ## record 24 demonstrations, train briefly, evaluate; leaves a video and a table (< 15 min)
+demo: $(READY) ## the trained policy clears a pile where it is pointed at; leaves a video, a map and a table (< 5 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
+
+tutorial: $(READY) ## record paired demonstrations, train on them, evaluate: docs/tutorial
+	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/tutorial.sh outputs/tutorial
 
 demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leaves a video and a table (< 3 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo_fr5.sh outputs/demo_fr5

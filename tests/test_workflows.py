@@ -105,9 +105,9 @@ def test_the_workflow_stays_out_of_a_folder_that_it_has_not_made(tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.tex"]
 
 
-@pytest.mark.parametrize("script", ["demo.sh", "demo_fr5.sh"])
+@pytest.mark.parametrize("script", ["demo.sh", "demo_fr5.sh", "tutorial.sh"])
 def test_a_demo_stays_out_of_a_folder_that_it_has_not_made(tmp_path, script):
-    mine = [tmp_path / "out" / name / "thesis.tex" for name in ("train", "eval", "correct", "mismatched")]
+    mine = [tmp_path / "out" / name / "thesis.tex" for name in ("train", "eval", "play", "correct", "mismatched")]
     for path in mine:
         path.parent.mkdir(parents=True)
         path.write_text("years of work")

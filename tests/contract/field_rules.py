@@ -207,8 +207,8 @@ TASK = {
     "target_overlay": flag,
 }
 SOIL = one_of("sand", "gravel", "dirt", "wet_sand")
-ZONES = {"none", "-0.5,-3,1,-1.5", "0,0,1,1; 2, 2, 3, 3.5"}
-NO_ZONES = ("", "0,0,1", "0,0,0,1", "0,1,1,0", "0,0,1,inf", "nan,0,1,1", "0,0,1,1;", "0,0,1,1,2", "a,0,1,1")
+ZONES = {"none", "-0.5,-3,1,-1.5", "0,0,1,1; 2,2,3,3.5"}
+NO_ZONES = ("", "0,0,1", "0,0,0,1", "0,1,1,0", "0,0,1,inf", "nan,0,1,1", "0,0,1,1;", "0,0,1,1,2", "a,0,1,1", "4,0,5,1")
 EXCAVATOR = {
     **TASK,
     **{"task": one_of("Scoop-v0", "Clear-v0"), "soil": SOIL, "fidelity": one_of("fast", "standard", "fine")},

@@ -3,11 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lerobot_excav.envs.machines.excavator.constants import DIG_AREA_EXTENT_M as DIG_AREA_EXTENT_M
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.soil import Container
-
-DIG_AREA_EXTENT_M = (6.0, 6.0)
-"""Size of the soil grid along x and y [m], centred on the world origin."""
 
 SOIL_CELL_SIZE_M = 0.05
 """Edge of a column of the soil grid [m] (kind: tuned; coarser columns make the cut jump)."""

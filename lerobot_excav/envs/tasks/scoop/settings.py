@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
-from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones
+from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones, zone_text
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
 from lerobot_excav.setting import setting, with_default
@@ -41,6 +41,7 @@ class ExcavatorSettings(TaskSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         zones = parsed_zones(f"{self.PREFIX}keep_out", self.keep_out)
+        self.keep_out = zone_text(zones)
         require(
             not zones or self.task != "Scoop-v0",
             f"{self.PREFIX}keep_out={self.keep_out!r} has no effect with {self.PREFIX}task='Scoop-v0', whose regions "

@@ -1,0 +1,46 @@
+"""Make a time lapse of a video: every n-th picture of it, as mp4 or, small enough for a README, as an animated WebP.
+
+python examples/time_lapse.py outputs/demo/play/videos/excavator_0/eval_episode_0.mp4 clearing.mp4 --every=10
+python examples/time_lapse.py … clearing.webp --every=20 --width=480
+"""
+
+import argparse
+import sys
+from itertools import islice
+from pathlib import Path
+
+from PIL import Image
+
+from lerobot_excav.evaluation.result_page.video_grid import read_video
+from lerobot_excav.evaluation.video import write_video
+
+
+def main() -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("video", type=Path, help="mp4 file to read")
+    parser.add_argument("out", type=Path, help="file to write: .mp4 or .webp")
+    parser.add_argument("--every", type=int, default=10, help="take every n-th picture (default: 10)")
+    parser.add_argument("--fps", type=int, default=10, help="pictures per second of the time lapse (default: 10)")
+    parser.add_argument("--width", type=int, help="width of a .webp [px] (default: as it is)")
+    given = parser.parse_args()
+    if given.every < 1 or given.fps < 1:
+        parser.error("--every and --fps: allowed are 1 and above")
+    pictures = islice(read_video(given.video), 0, None, given.every)
+    if given.out.suffix == ".mp4":
+        write_video(given.out, pictures, given.fps, crf=20)
+        return 0
+    if given.out.suffix != ".webp":
+        parser.error(f"out={given.out}: allowed are .mp4 and .webp")
+    images = [Image.fromarray(picture) for picture in pictures]
+    if given.width:
+        height = round(images[0].height * given.width / images[0].width)
+        images = [image.resize((given.width, height), Image.Resampling.LANCZOS) for image in images]
+    first, *rest = images
+    options = {"quality": 55, "method": 6, "duration": round(1000 / given.fps), "loop": 0}
+    first.save(given.out, save_all=True, append_images=rest, **options)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
