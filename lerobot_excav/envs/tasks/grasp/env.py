@@ -145,7 +145,7 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
     def environment_state(self) -> NDArray[np.float32]:
         """Middle of the commanded block, then of every block, (15,) float32 [m]; see `spec.ENVIRONMENT_STATE_NAMES`."""
         block_pos_w = self.workcell.block_pos_w
-        return np.concatenate([block_pos_w[self.target_id], block_pos_w.ravel()]).astype(np.float32)
+        return np.asarray(np.concatenate([block_pos_w[self.target_id], block_pos_w.ravel()]), np.float32)
 
     @property
     def is_success(self) -> bool:
