@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from lerobot_excav.datasets.record.workers import worker_pool
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.whole_file import write_whole
 from validation.operator_delay.drive import Condition, drive
 from validation.operator_delay.page import write_page
 
@@ -72,7 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def read_scoops(path: Path) -> list[dict[str, Any]]:
     """Return the finished scoops of the present simulation, of a file that may not exist yet."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    if lines and not lines[-1].endswith("\n"):  # an interruption cut it short: that scoop is played again
+        write_whole(path, "".join(lines[:-1]))
+        lines.pop()
     scoops = [json.loads(line) for line in lines]
     return [scoop for scoop in scoops if scoop["simulation_version"] == SCOOP.simulation_version]
 

@@ -81,3 +81,11 @@ def test_finished_scoops_are_not_played_again_and_those_of_another_simulation_do
     assert sorted(played) == [(10, 0, 1), (10, 20, 0), (10, 20, 1)]
     assert command.main(arguments) == 0
     assert len(played) == 3
+
+
+def test_a_line_that_an_interruption_cut_short_is_dropped(tmp_path):
+    whole, torn = json.dumps(scoop(10, 0, 0)) + "\n", json.dumps(scoop(10, 0, 1))[:50]
+    path = tmp_path / "scoops.jsonl"
+    path.write_text(whole + torn)
+    assert [found["scene_id"] for found in command.read_scoops(path)] == [0]
+    assert path.read_text() == whole
