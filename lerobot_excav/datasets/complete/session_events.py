@@ -69,6 +69,13 @@ class CommandEvent(_Event):
     target_id: NonNegativeInt
 
 
+class OperatorEvent(_Event):
+    """Another than a person commands this episode."""
+
+    event: Literal["operator"]
+    operator: Literal["scripted"]
+
+
 class HeldEvent(_Event):
     """The machine was held still until its mask was found."""
 
@@ -99,7 +106,17 @@ class DiscardEvent(_Event):
     event: Literal["discarded"]
 
 
-Event = SessionEvent | EpisodeEvent | ActionEvent | CommandEvent | HeldEvent | RestartEvent | EndEvent | DiscardEvent
+Event = (
+    SessionEvent
+    | EpisodeEvent
+    | OperatorEvent
+    | ActionEvent
+    | CommandEvent
+    | HeldEvent
+    | RestartEvent
+    | EndEvent
+    | DiscardEvent
+)
 _LINE: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
 
 

@@ -77,7 +77,7 @@ def play_again(
     *,
     fps: int,
     columns: Mapping[str, str],
-    then_hold: bool = False,
+    rest_frames: int = 0,
 ) -> Episode:
     """Play the recorded actions of an episode (n, a) again, without pictures and with its own commands.
 
@@ -88,12 +88,12 @@ def play_again(
         schedule: Changes of the command.
         fps: Frames per second.
         columns: Settings that datasets keep in every frame, by name.
-        then_hold: Whether the machine is then held still until the task is over, at most for its time limit.
+        rest_frames: For how many frames the machine is held still after them.
     """
-    length = len(action) + spec.length_at(fps) if then_hold else spec.replay_length(len(action))
+    length = spec.replay_length(len(action) + rest_frames)
     settings = spec.make_settings(scene_set=pair.scene_set, fps=fps, episode_length=length, **columns)
     with closing(make_environment(settings, with_images=False)) as env:
-        return replay(env, action, pair, schedule, then_hold=then_hold)
+        return replay(env, action, pair, schedule, rest_frames=rest_frames)
 
 
 _open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []
