@@ -28,7 +28,9 @@ def select(
     - `non-paired`: every scene once, targets as equally frequent as the scenes allow.
     - `balanced`: every target equally often, from whatever scenes have it.
 
-    A scene at another stage or on another soil counts as another scene. Scenes are chosen at random, but the same seed chooses the same, and a smaller choice is part of a larger one
+    A scene at another stage or on another soil counts as another scene.
+
+    Scenes are chosen at random, but the same seed chooses the same, and a smaller choice is part of a larger one
     (except that `non-paired` may show a scene with another target).
 
     Args:

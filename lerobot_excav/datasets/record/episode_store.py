@@ -99,6 +99,14 @@ class EpisodeStore:
             raise _damaged(path)
         return outcome
 
+    def pairs_of_start(self, start: Pair) -> list[Pair]:
+        """Return the finished episodes from the start of a pair, in the order of their targets."""
+        stem = self._path(start, "json").stem.rpartition("-")[0]
+        targets = (path.stem.rpartition("-")[2] for path in self._folder.glob(f"{stem}-*.json"))
+        return [
+            start._replace(target_id=target) for target in sorted(int(word) for word in targets if word.isdecimal())
+        ]
+
     def read(self, pair: Pair) -> Episode:
         """Read a finished episode whose frames were kept.
 
