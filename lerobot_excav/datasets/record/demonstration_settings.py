@@ -42,7 +42,8 @@ class PlayedScenes:
         choices=tuple(range(1, TARGETS_PER_SCENE + 1)),
     )
     target_rule: str = setting(
-        "With one target: go round the targets from scene to scene, draw it, or take the one nearest at the start",
+        "With one target: go round the targets from start to start, draw it, or take the nearest: the block nearest to "
+        "the gripper, the region with the shortest swing to the box",
         default="round",
         choices=TARGET_RULES,
     )
