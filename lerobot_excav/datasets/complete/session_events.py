@@ -50,7 +50,7 @@ class EpisodeEvent(_Event):
     event: Literal["episode"]
     episode_index: NonNegativeInt
     scene_id: int = Field(ge=0, le=LAST_SCENE)
-    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
+    stage: NonNegativeInt
     target_id: NonNegativeInt
 
 
@@ -87,7 +87,7 @@ class RestartEvent(_Event):
 
     event: Literal["restart"]
     scene_id: int = Field(ge=0, le=LAST_SCENE)
-    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
+    stage: NonNegativeInt
     target_id: NonNegativeInt
     state: Vector | None
     action: Vector | None

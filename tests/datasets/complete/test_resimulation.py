@@ -131,7 +131,7 @@ def test_a_recording_of_corrupted_masks_is_completed(tmp_path):
     env = {"mask_condition": "zero", "table": "ice"}
     record_toy(tmp_path / "original", scenes=1, env=env)
     recording, session = make_recording(tmp_path / "original", tmp_path, env=env)
-    complete_recording(recording, session)
+    complete_recording(recording, session, operator="scripted")
     pd.testing.assert_frame_equal(build_index(recording), build_index(tmp_path / "original"))
 
 
@@ -203,7 +203,7 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
 
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):
     path = session({1: {"held": 3, "frames": 4}, 6: {"held": 0}})
-    out = complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True)
+    out = complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True, operator="scripted")
     expected = build_index(paired_dataset).drop(index=[1, 6]).reset_index(drop=True)
     expected["episode_index"] = range(17)
     pd.testing.assert_frame_equal(build_index(out), expected)

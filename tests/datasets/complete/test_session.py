@@ -53,11 +53,6 @@ def test_who_drives_is_known_where_the_log_says_so_and_belongs_to_its_episode(re
     assert [episode.operator for episode in episodes.values()] == ["scripted", None]
 
 
-def test_a_start_of_an_earlier_release_is_at_stage_0(read):
-    earlier = {key: value for key, value in EPISODE.items() if key != "stage"}
-    assert read(SESSION, earlier, ACTION)[0].pair.stage == 0
-
-
 def test_a_restart_begins_another_run_with_its_own_commands(read):
     frame = {"state": [0.5, 0.5], "action": [0.25, 0.0]}
     restart = {**RESTART, "target_id": 2, **frame}
