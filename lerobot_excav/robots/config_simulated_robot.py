@@ -35,6 +35,12 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
 
     scene_id: int = setting("First scene", default=0, low=0, high=LAST_SCENE)
     target_id: int = setting("First target in it", default=0, choices=tuple(range(TARGETS_PER_SCENE)))
+    stage: int = setting(
+        "Stage of every scene: how many cycles a seeded operator has dug in it before; reaching one takes seconds a "
+        "cycle, at the first target of every scene",
+        default=0,
+        low=0,
+    )
     advance: str = setting(
         "What leads to the next target: episode gives every recorded episode its own, button waits for the key "
         "next_scene of the side channel",
@@ -57,6 +63,11 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
             length is None,
             f"robot.episode_length={length} has no effect: the command ends an episode. Leave it out; lerobot-record "
             "takes --dataset.episode_time_s.",
+        )
+        last = self.task_spec.last_stage
+        require(
+            self.stage <= last,
+            f"robot.stage={self.stage} is not possible with robot.task={self.task_spec.id!r}; the last stage is {last}",
         )
         starts = self.task_spec.starts_per_scene  # a robot without such a task is refused at once
         require(

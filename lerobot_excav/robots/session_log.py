@@ -6,11 +6,12 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
 
     {"event": "session", "simulation_version": 4, "env": "excavator", "settings": {"task": "Scoop-v0", "fps": 10, ...},
      "task": "Dig where the mask points."}
-    {"event": "episode", "episode_index": 3, "scene_id": 0, "target_id": 3}
+    {"event": "episode", "episode_index": 3, "scene_id": 0, "stage": 0, "target_id": 3}
+    {"event": "operator", "operator": "scripted"}
     {"event": "action", "state": [...], "action": [...]}
     {"event": "command", "target_id": 1}
     {"event": "held"}
-    {"event": "restart", "scene_id": 0, "target_id": 3, "state": [...], "action": [...]}
+    {"event": "restart", "scene_id": 0, "stage": 0, "target_id": 3, "state": [...], "action": [...]}
     {"event": "ended", "frames": 150}
     {"event": "discarded"}
     {"event": "stopped", "frames": 12}
@@ -19,6 +20,7 @@ index` can complete a recording, or recover one from a crash. It is JSON Lines, 
   command, null if nobody knows it.
 - `episode`: an episode begins. `episode_index` is its number in the dataset; what an earlier line says of this number
   and of higher ones was not kept.
+- `operator`: a scripted operator drives in this episode; without such a line, it is a person or a policy.
 - `action`: a frame, as LeRobot records it: the state that was observed, and the action that was carried out next, both
   float32 and exact.
 - `command`: another command holds from here on; its target may have the number of the one before.
@@ -69,6 +71,7 @@ class SessionLog:
         self._is_running = False  # whether an episode is
         self._command: tuple[int | None, int] = (None, 0)  # target, and since which action
         self._frames = 0  # of the running episode
+        self._operator: str | None = None  # of the running episode, once it is noted
 
     def start(self) -> None:
         """Open the file to append to it; it is made if it is missing."""
@@ -91,15 +94,21 @@ class SessionLog:
             self._lock.release()
         self._lock = None
 
-    def begin(self, episode_index: int, *, scene_id: int, target_id: int) -> None:
+    def begin(self, episode_index: int, *, scene_id: int, target_id: int, stage: int = 0) -> None:
         """Begin an episode; from the first one on no other robot may write into the file."""
         if not self._is_begun:
             self._keep_others_away()
             self._write(self._session)
         self._is_begun = self._is_running = True
-        self._command, self._frames = (target_id, 0), 0
-        start = {"episode_index": episode_index, "scene_id": scene_id, "target_id": target_id}
-        self._write({"event": "episode", **start})
+        self._command, self._frames, self._operator = (target_id, 0), 0, None
+        start = {"scene_id": scene_id, "stage": stage, "target_id": target_id}
+        self._write({"event": "episode", "episode_index": episode_index, **start})
+
+    def note_operator(self, operator: str) -> None:
+        """Note who drives, `scripted`, in the running episode; once, however often it is told."""
+        if self._is_running and operator != self._operator:
+            self._operator = operator
+            self._write({"event": "operator", "operator": operator})
 
     def note_action(
         self, state: Sequence[float], action: Sequence[float], target_id: int | None, command_frame: int = 0
@@ -124,13 +133,19 @@ class SessionLog:
             self._write({"event": "held"})
 
     def note_restart(
-        self, state: Sequence[float] | None, action: Sequence[float] | None, *, scene_id: int, target_id: int
+        self,
+        state: Sequence[float] | None,
+        action: Sequence[float] | None,
+        *,
+        scene_id: int,
+        target_id: int,
+        stage: int = 0,
     ) -> None:
         """Note that a scene was started within the episode, and the frame in which that was asked for."""
         if self._is_running:
             self._command = (target_id, 0)
             self._frames += state is not None and action is not None
-            start = {"scene_id": scene_id, "target_id": target_id}
+            start = {"scene_id": scene_id, "stage": stage, "target_id": target_id}
             self._write({"event": "restart", **start, "state": state, "action": action})
 
     def end(self) -> None:

@@ -111,6 +111,11 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         return self._order.start[1]
 
     @property
+    def start(self) -> dict[str, int]:
+        """Current scene, stage and target, as options of the environment's `reset`."""
+        return {"scene_id": self.scene_id, "stage": self.config.stage, "target_id": self.target_id}
+
+    @property
     def is_connected(self) -> bool:
         """Whether the simulation runs."""
         return self._env is not None
@@ -227,10 +232,13 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
             raise DeviceError("this robot offers no depth image; set --robot.depth=true.")
         return self.env.depth_m()
 
+    def note_operator(self, operator: str) -> None:
+        """Take note of who drives, `scripted`, for the session log; a person does otherwise, or a policy."""
+        self._log.note_operator(operator)
+
     def start_scene(self) -> None:
         """Reset the environment to the current scene and target."""
-        options = {"scene_id": self.scene_id, "target_id": self.target_id}
-        self._observation, info = self.env.reset(options=options)
+        self._observation, info = self.env.reset(options=dict(self.start))
         self._held_frames = info["mask_missing_frames"]
         self._is_homing = False
         self._require_mask(info)
@@ -240,7 +248,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     def _begin_episode(self, episode_index: int) -> None:
         self._order.begin(episode_index)
         self.start_scene()
-        self._log.begin(episode_index, scene_id=self.scene_id, target_id=self.target_id)
+        self._log.begin(episode_index, **self.start)
         if self._held_frames:
             self._log.note_held()
 
@@ -256,7 +264,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         state, wanted = None, None
         if all(name in action for name in names):  # else LeRobot has no frame to record
             state, wanted = self._state, command_from_action(action, names).tolist()
-        self._log.note_restart(state, wanted, scene_id=self.scene_id, target_id=self.target_id)
+        self._log.note_restart(state, wanted, **self.start)
         self.start_scene()
 
     def _end_episode(self) -> None:

@@ -8,6 +8,8 @@ Examples:
       rebuild; list scenes with missing or duplicate targets
   lerobot-excav index outputs/recorded --session=outputs/excavator_sim_sessions/2026-01-31_10-00-00.jsonl
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
+  lerobot-excav index outputs/rolled_out --session=outputs/session.jsonl --operator=policy
+      the same for what lerobot-rollout recorded: a policy commanded
   lerobot-excav index outputs/recorded --session=outputs/session.jsonl --recover
       after a crash of lerobot-record: play every finished episode again, and write a dataset that can be read
   lerobot-excav index outputs/paired --split=scene --eval_fraction=0.2
@@ -22,6 +24,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from lerobot_excav.datasets.format.schema import OPERATORS
 from lerobot_excav.datasets.format.version_check import episodes_by_version, require_one_version, versions_of
 from lerobot_excav.datasets.pairs.pair_coverage import PairCoverage, pair_coverage, start_settings
 from lerobot_excav.datasets.pairs.selection import COMPOSITIONS, select, usable
@@ -41,6 +44,12 @@ class IndexArguments(DatasetArguments):
     session: Path | None = setting("Session log of the simulated robot: add the excav.* columns first", default=None)
     out: Path | None = setting("With a session: put the completed dataset here, and keep the recording", default=None)
     skip_restarted: bool = setting("With a session: leave out episodes in which the scene was restarted", default=False)
+    operator: str | None = setting(
+        "With a session: who commanded; left out: the scripted operator where the log says so, else a person. Say "
+        "policy for what lerobot-rollout has recorded",
+        default=None,
+        choices=OPERATORS,
+    )
     recover: bool = setting(
         "With a session: write the dataset again after a crash, pictures included, instead of completing it; the "
         "damaged files are kept beside it",
@@ -72,7 +81,13 @@ def run(arguments: IndexArguments) -> int:
     if arguments.session is not None:
         from lerobot_excav.datasets.complete.resimulation import complete_recording
 
-        root = complete_recording(root, arguments.session, out=arguments.out, skip_restarted=arguments.skip_restarted)
+        root = complete_recording(
+            root,
+            arguments.session,
+            out=arguments.out,
+            skip_restarted=arguments.skip_restarted,
+            operator=arguments.operator,
+        )
     index = write_index(root)
     if not arguments.flags:
         print(f"{root / INDEX_PATH}: {len(index)} episodes")
@@ -86,12 +101,14 @@ def _require_options_with_effect(arguments: IndexArguments) -> None:
     with_session = {
         "--out": arguments.out is not None,
         "--skip_restarted": arguments.skip_restarted,
+        "--operator": arguments.operator is not None,
         "--recover": arguments.recover,
     }
     for option, given in with_session.items():
         require(not given or arguments.session is not None, f"{option} is of use with --session only")
     require(arguments.task is None or arguments.recover, "--task is of use with --recover only")
-    others = arguments.skip_restarted or arguments.seed is not None or arguments.eval_fraction is not None
+    completes = arguments.skip_restarted or arguments.operator is not None
+    others = completes or arguments.seed is not None or arguments.eval_fraction is not None
     require(
         not arguments.recover or not (others or _asks_for_episodes(arguments)),
         "--recover only writes the dataset again; complete it afterwards, with --session and without --recover",
@@ -138,16 +155,24 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     lines = [
         "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in versions.items()),
         *(_counts(name, index[name]) for name in start_settings(index)),
-        f"scenes: {coverage.scenes}, of which {coverage.complete_scenes} with all {coverage.targets} targets",
+        f"{_starts(index, coverage)}, of which {coverage.complete_starts} with all {coverage.targets} targets",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
         *(task_spec("excav.task", str(task)).measures.summary(rows) for task, rows in index.groupby("task")),
     ]
     if len(versions) > 1:
         lines.append("mixed: a scene's number means another scene in each version, so pairs cannot be told")
         return lines
-    lines += [f"missing: {scene} lacks target {targets}" for scene, targets in coverage.missing.items()]
+    lines += [f"missing: {start} lacks target {targets}" for start, targets in coverage.missing.items()]
     lines += [f"duplicate: {uid} in episodes {episodes}" for uid, episodes in coverage.duplicates.items()]
     return lines
+
+
+def _starts(index: pd.DataFrame, coverage: PairCoverage) -> str:
+    """Say how many starts there are, and that they are scenes where every scene is shown at one stage."""
+    stages = sorted(set(index["stage"]))
+    if stages == [0]:
+        return f"scenes: {coverage.starts}"
+    return f"starts: {coverage.starts} of {coverage.scenes} scenes at stages {', '.join(map(str, stages))}"
 
 
 def _counts(name: str, column: pd.Series) -> str:

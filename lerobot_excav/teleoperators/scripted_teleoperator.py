@@ -58,10 +58,11 @@ class ScriptedTeleoperator(SimulationTeleoperator):
         robot = live.connected_robot(self.robot_type)
         episode = (id(robot), robot.episode_count)
         if self._operator is None or episode != self._episode:
-            seed = (self.config.seed, robot.scene_id, robot.target_id)
+            seed = (self.config.seed, robot.scene_id, robot.target_id, *filter(None, (robot.start["stage"],)))
             self._operator = robot.task_spec.make_operator(np.random.default_rng(seed))
             self._operator.reset(robot.env)
             self._episode = episode
+        robot.note_operator("scripted")
         limits = robot.task_spec.action_low, robot.task_spec.action_high
         command = np.clip(self._operator.act(robot.env), *limits)
         return dict(zip(robot.task_spec.action_names, command.tolist(), strict=True))

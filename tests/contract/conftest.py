@@ -27,7 +27,7 @@ class StandInEnv:
     def reset(self, *, options):
         self.state = np.zeros(len(self._robot.task_spec.state_names), np.float32)
         self.state[:2] = options["scene_id"], options["target_id"]
-        self.target_id = options["target_id"]
+        self.target_id, self.options = options["target_id"], options
         return self._observe(), self.info()
 
     def step(self, action):

@@ -229,6 +229,7 @@ LEROBOTS_OWN = ("id", "calibration_dir")
 ROBOT = {
     "scene_id": whole(0, ENDLESS),
     "target_id": whole(0, 3),
+    "stage": whole(0, 15),
     "advance": one_of("episode", "button"),
     "session_log": optional(path),
     "depth": flag,
@@ -267,10 +268,14 @@ SCENES = {
     "first_scene": whole(0, ENDLESS).beside(scenes=1),
     "scenes": whole(1, 100_000),
     "targets": optional(whole(1, 4)),
-    "target_rule": one_of("round", "uniform").beside(targets=1),  # the excavator tells no target as the nearest
+    "target_rule": one_of("round", "uniform", "nearest").beside(targets=1),
     "seed": whole(0, SEED),
 }
-DEMOS = {**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag}
+STAGES = ("0", "15", "0,4,8", "8, 0"), ("16", "0,,4", "4,4", "-1", "1.5", "0;4", "²", "9" * 5000)
+DEMOS = {
+    **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
+    "stages": Rule(lambda v: isinstance(v, str) and v in (*STAGES[0], "1"), (*STAGES[0], *STAGES[1])),
+}
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}
 COMMAND_TABLES = {
@@ -286,6 +291,7 @@ COMMAND_TABLES = {
         **dict.fromkeys(("dataset", "session", "out"), optional(path)),
         **dict.fromkeys(("skip_restarted", "recover", "include_failures", "flags"), flag),
         "task": optional(text),
+        "operator": optional(one_of("scripted", "person", "policy")),
         "select": one_of("all", "paired", "non-paired", "balanced"),
         **dict.fromkeys(("episodes", "scenes"), optional(whole(1))),
         "split": optional(one_of("scene", "episode")),
@@ -331,7 +337,7 @@ CONFIGURATIONS = {
     ),
     "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV | {"render_camera": one_of("overview", "main", "top")}, {}),
     "excavator_sim": (ExcavatorSimConfig, EXCAVATOR | ROBOT, {}),
-    "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS))}, {}),
+    "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS)), "stage": whole(0, 0)}, {}),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),
     "excavator_operator": (ExcavatorOperatorConfig, {"seed": whole(0)}, {}),
     "fr5_operator": (FR5OperatorConfig, {"seed": whole(0)}, {}),

@@ -16,7 +16,7 @@ GYM_IDS = sorted(spec.gym_id for spec in TASKS.values() if spec.env_entry.starts
 FRAMES = 12
 # What reports read of every task.
 METRICS = (
-    *("simulation_version", "task", "scene_set", "scene_id", "target_id", "is_success", "frames"),
+    *("simulation_version", "task", "scene_set", "scene_id", "stage", "target_id", "is_success", "frames"),
     *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "target_overlay", "shown_target_id"),
     *("fps", "episode_length", "commands", "mask_missing", "mask_missing_frames"),
 )
@@ -206,6 +206,11 @@ def test_lerobot_learns_task_length_and_frame_rate(env):
     assert env.metadata["render_fps"] >= 1
     env.reset(seed=4)
     assert env.render().dtype == np.uint8
+
+
+def test_the_stage_is_told_and_is_0_unless_asked_for(env):
+    info = env.reset(seed=4)[1]
+    assert (info["scene_id"], info["stage"]) == (4, 0)
 
 
 def test_an_episode_ends_with_its_metrics(gym_id):

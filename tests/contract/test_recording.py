@@ -61,6 +61,30 @@ def test_the_session_log_describes_each_episode(make_robot, record_episode):
     assert (episode.frames, episode.restarts, episode.schedule, episode.end) == (4, [], (), "ended")
 
 
+def test_the_stage_of_the_robot_reaches_environment_and_log(make_robot, record_episode):
+    last = make_robot().task_spec.last_stage
+    robot = make_robot(stage=last)
+    record_episode(robot, 0)
+    robot.send_action({"reinitialise": 1.0})
+    assert robot.env.options == {"scene_id": 0, "stage": last, "target_id": 0}
+    logging.info("Stop recording")
+    assert [episode.pair.stage for episode in read_session(robot.config.session_log).values()] == [last]
+
+
+def test_who_drives_is_noted_once_an_episode_and_only_within_one(make_robot, still):
+    robot = make_robot()
+    robot.note_operator("scripted")
+    for index in range(2):
+        logging.info(f"Recording episode {index}")
+        for _ in range(2):
+            if index == 0:
+                robot.note_operator("scripted")
+            robot.send_action(still)
+        logging.info("Reset the environment")
+    assert logged(robot, "episode_index", "operator") == [(0, "scripted"), (1, None)]
+    assert robot.config.session_log.read_text().count('"operator"') == 2  # one line, with event and value
+
+
 def test_restarts_within_an_episode_are_noted(make_robot, still):
     robot = make_robot()
     logging.info("Recording episode 0")

@@ -79,6 +79,14 @@ def test_scene_and_seed_decide_the_demonstration(robot, make_operator):
     assert drive(robot, operator) != first
 
 
+def test_the_session_log_says_that_it_drives(robot, make_operator, monkeypatch):
+    noted = []
+    robot.connect()
+    monkeypatch.setattr(robot, "note_operator", noted.append)
+    make_operator().get_action()
+    assert noted == ["scripted"]
+
+
 def test_what_it_records_is_what_the_robot_carries_out(robot, make_operator):
     robot.connect()
     operator = make_operator()

@@ -51,6 +51,16 @@ from .toy import MAIN, MASK, STATE
 NEAR = "observation.images.near"
 
 
+def at_stage(stage):
+    """Return a change of the episode's stage, in all columns that name it."""
+
+    def apply(root):
+        set_frames("excav.stage", stage)(root)
+        set_frames("excav.pair_uid", f"toy_reach/train/1/{stage}/1")(root)
+
+    return apply
+
+
 @dataclass(frozen=True)
 class Damage:
     """A change of a dataset; `told` is what the verdict on it has to hold, nothing for a harmless one."""
@@ -137,6 +147,15 @@ COLUMNS = {
         "unknown scene set",
     ),
     "pair_uid of another scene": Damage(set_frames("excav.pair_uid", "toy_reach/train/0/0/0"), "contradict"),
+    "another stage": Damage(set_frames("excav.stage", 4), "contradict"),
+    "a stage that the task lacks": Damage(at_stage(4), "excav.stage=4 is not possible; the last stage is 0"),
+    "an unknown operator": Damage(set_frames("excav.operator", "robot"), "excav.operator='robot' is not known"),
+    "operator that changes": Damage(set_frames("excav.operator", "person", slice(1)), "excav.operator changes"),
+    "a takeover without policy": Damage(
+        set_frames("excav.intervention", value=True, frames=slice(2, 3)), "excav.intervention is true at frame 2"
+    ),
+    "outcome that changes": Damage(set_frames("excav.outcome", [1.0, 1.0], slice(1)), "excav.outcome changes"),
+    "a rest of a task without": Damage(set_frames("excav.rest_frames", 3), "excav.rest_frames=3 is not possible"),
     "pair_uid of another robot": Damage(set_frames("excav.pair_uid", "excavator/train/1/0/0"), "is of 'excavator'"),
     "another target": Damage(set_frames("excav.target_id", 9, slice(1, None)), "excav.target_id=9 is not possible"),
     "a negative target": Damage(set_frames("excav.target_id", -1, slice(1, None)), "excav.target_id=-1 is not"),

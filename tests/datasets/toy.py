@@ -5,7 +5,15 @@ from lerobot.datasets import LeRobotDataset
 from toy_reach.spec import REACH
 
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
-from lerobot_excav.datasets.format.schema import ACTION_KEY, COMMAND_KEY, PAIR_KEY, SCENE_KEY, STATE_KEY, TARGET_KEY
+from lerobot_excav.datasets.format.schema import (
+    ACTION_KEY,
+    COMMAND_KEY,
+    PAIR_KEY,
+    SCENE_KEY,
+    STAGE_KEY,
+    STATE_KEY,
+    TARGET_KEY,
+)
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
@@ -53,9 +61,9 @@ def write_session(dataset, path, env=None, episodes=None):
     """Write the session log of a robot that recorded a dataset."""
     log = SessionLog(path, REACH, toy_settings(env=env).env)
     log.start()
-    keys = (PAIR_KEY, SCENE_KEY, TARGET_KEY, COMMAND_KEY, STATE_KEY, ACTION_KEY)
+    keys = (PAIR_KEY, SCENE_KEY, STAGE_KEY, TARGET_KEY, COMMAND_KEY, STATE_KEY, ACTION_KEY)
     for episode in iterate_episodes(dataset, keys, episodes=episodes):
-        log.begin(episode.index, scene_id=episode.pair.scene_id, target_id=episode.pair.target_id)
+        log.begin(episode.index, **episode.pair.reset_options)
         since = episode.array(COMMAND_KEY)
         targets, since = ([*column[1:].tolist(), int(column[-1])] for column in (episode.target_id, since))
         for state, action, *command in zip(episode.state, episode.action, targets, since, strict=True):

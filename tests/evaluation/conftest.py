@@ -28,7 +28,8 @@ GRASP = {
 def line(task, number, /, **changes):
     """A line of a metrics file; unless changed, a success in the scene and with the seed of its number."""
     target = number % 4
-    place = {"episode_ix": number, "seed": number, "scene_id": number, "target_id": target, "commands": [[0, target]]}
+    place = {"episode_ix": number, "seed": number, "scene_id": number, "stage": 0, "target_id": target}
+    place["commands"] = [[0, target]]
     grasped = {"first_grasped_block": target} if task is GRASP else {}
     return {**place, **SHARED, "shown_target_id": target, **task, **grasped, **changes}
 

@@ -26,7 +26,7 @@ def test_several_seeds_have_no_mcnemar_test(make_run, scoop_line, rng):
 
 
 def test_runs_on_other_scenes_are_not_compared(make_run, scoop_line, rng):
-    with pytest.raises(DatasetError, match=r"a and b differ in 2 scenes and targets \(test/1/1, test/2/2"):
+    with pytest.raises(DatasetError, match=r"a and b differ in 2 scenes and targets \(test/1/0/1, test/2/0/2"):
         compare(make_run("a", [scoop_line(1)]), make_run("b", [scoop_line(2)]), rng)
 
 

@@ -8,8 +8,8 @@ from lerobot_excav.evaluation.metrics import read_evaluation
 
 def test_a_metrics_file_is_read_by_scene_and_target(metrics_file, scoop_line):
     evaluation = read_evaluation(metrics_file("m.jsonl", [scoop_line(3), scoop_line(4, retained_mass_kg=20)]))
-    assert list(evaluation.episodes) == [EpisodeKey("test", 3, 3), EpisodeKey("test", 4, 0)]
-    assert evaluation.episodes[EpisodeKey("test", 4, 0)].retained_mass_kg == 20.0
+    assert list(evaluation.episodes) == [EpisodeKey("test", 3, 0, 3), EpisodeKey("test", 4, 0, 0)]
+    assert evaluation.episodes[EpisodeKey("test", 4, 0, 0)].retained_mass_kg == 20.0
     assert (evaluation.task, evaluation.operator, evaluation.seed) == ("Scoop-v0", None, 3)
 
 
@@ -20,7 +20,14 @@ def test_what_the_environment_logs_is_read_also_by_its_folder(tmp_path, scoop_li
     log.finish_episode(0, {"episode_metrics": metrics})
     evaluation = read_evaluation(tmp_path)
     assert evaluation.path == tmp_path / "metrics.jsonl"
-    assert list(evaluation.episodes) == [EpisodeKey("test", 1000, 0)]
+    assert list(evaluation.episodes) == [EpisodeKey("test", 1000, 0, 0)]
+
+
+def test_stages_of_a_scene_are_told_apart_and_a_file_without_them_is_of_stage_0(metrics_file, scoop_line):
+    lines = [scoop_line(3), {**scoop_line(3, stage=4), "episode_ix": 4}]
+    assert [key.stage for key in read_evaluation(metrics_file("m.jsonl", lines)).episodes] == [0, 4]
+    earlier = {key: value for key, value in scoop_line(3).items() if key != "stage"}
+    assert list(read_evaluation(metrics_file("e.jsonl", [earlier])).episodes) == [EpisodeKey("test", 3, 0, 3)]
 
 
 def test_the_last_of_several_evaluations_in_a_file_counts(metrics_file, scoop_line):
@@ -99,7 +106,7 @@ def test_mixed_lines_of_earlier_versions_are_refused(metrics_file, scoop_line, o
         ({"scene_id": True}, "scene_id=True: input should be a valid integer"),
         ({"scene_id": 2.5}, r"scene_id=2\.5: input should be a valid integer"),
         ({"task": "FR5Grasp-v0"}, "task='FR5Grasp-v0', but the lines before are of 'Scoop-v0'"),
-        ({"scene_id": 1, "target_id": 1, "commands": [[0, 1]]}, "test/1/1 occur twice"),
+        ({"scene_id": 1, "target_id": 1, "commands": [[0, 1]]}, "test/1/0/1 occur twice"),
         ({"commands": []}, r"commands=\[\] must be pairs of frame and target"),
         ({"commands": [[0, 3]]}, r"begin with \[0, target_id=2\]"),
         ({"commands": [[0, 2], [9, 1], [9, 3]]}, "in the order of their frames"),

@@ -43,7 +43,7 @@ def test_the_operators_file_is_read_like_that_of_a_policy(tmp_path, capsys):
     evaluation = read_evaluation(tmp_path / "new" / "operator.jsonl")
     assert evaluation.operator == "scripted"
     # lerobot-eval with seed 1000 shows scene 1000 + i with target (1000 + i) % 4.
-    assert [str(key) for key in evaluation.episodes] == ["test/1000/0", "test/1001/1", "test/1002/2"]
+    assert [str(key) for key in evaluation.episodes] == ["test/1000/0/0", "test/1001/0/1", "test/1002/0/2"]
     assert EvaluationOrigin.read(evaluation.path).packages["lerobot"]
     assert "3/3" in capsys.readouterr().err
 

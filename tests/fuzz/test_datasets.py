@@ -17,8 +17,8 @@ from ..datasets.toy import MAIN, MASK, STATE, record_small
 from .mutation import digests, harmful, harmless, inputs, require_kept, require_right, run
 
 CAMERAS = (MAIN, MASK, "observation.images.near")
-NUMBERS = ("index", "frame_index", "episode_index", "task_index", "excav.scene_id")
-VECTORS = (STATE, "action", "excav.task_state")
+NUMBERS = ("index", "frame_index", "episode_index", "task_index", "excav.scene_id", "excav.stage")
+VECTORS = (STATE, "action", "excav.task_state", "excav.outcome")
 COLUMNS = (*NUMBERS, *VECTORS, *CAMERAS, "timestamp", "excav.success", "excav.pair_uid", "excav.target_id")
 FILES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", changes.META, changes.DATA)
 INFO = ("fps", "total_episodes", "total_frames", "total_tasks", "features", "codebase_version", "robot_type")

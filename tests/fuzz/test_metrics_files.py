@@ -38,6 +38,7 @@ OUT_OF_RANGE = {
     "fps": [0],
     "episode_length": [0],
     "scene_set": ["", "tset", "TEST"],
+    "stage": [-1, None, 1.0, "1"],
     "mask_condition": ["", "wrong"],
     "mask_noise": ["blur"],
     "task": ["Dance-v0", ""],

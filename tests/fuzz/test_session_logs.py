@@ -23,6 +23,7 @@ WRONG_FIELDS = {
     "episode": {
         "episode_index": [-1, None, "0", 1.5, 7],
         "scene_id": [-1, None, "0", 2**40],
+        "stage": [-1, 1, None, "0"],
         "target_id": [-1, 4, None, "0"],
     },
     "action": {

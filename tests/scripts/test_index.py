@@ -26,7 +26,7 @@ def test_the_index_is_rewritten_and_described(paired_dataset, output):
         "19 episodes",
         "table: wood, 19 episodes",
         "scenes: 5, of which 4 with all 4 targets",
-        "missing: toy_reach/train/3 lacks target [1]",
+        "missing: toy_reach/train/3/0 lacks target [1]",
         "final distance: 0.0",
     ):
         assert line in text
@@ -63,7 +63,7 @@ def test_the_seed_reaches_the_split(paired_dataset, output):
     assert len(texts) > 1
 
 
-@pytest.mark.parametrize("other", ["--flags", "--skip_restarted", "--select=paired", "--seed=3"])
+@pytest.mark.parametrize("other", ["--flags", "--skip_restarted", "--operator=policy", "--select=paired", "--seed=3"])
 def test_recovery_does_nothing_else(paired_dataset, output, other):
     assert "--recover only writes the dataset again" in output(paired_dataset, "--session=s", "--recover", other)
 
@@ -73,6 +73,7 @@ def test_recovery_does_nothing_else(paired_dataset, output, other):
     [
         ("--out=x", "--out is of use with --session only"),
         ("--skip_restarted", "--skip_restarted is of use with --session only"),
+        ("--operator=policy", "--operator is of use with --session only"),
         ("--recover", "--recover is of use with --session only"),
         ("--task=go", "--task is of use with --recover only"),
         ("--eval_fraction=0.3", "--eval_fraction=0.3 has no effect without --split"),

@@ -8,11 +8,16 @@ import numpy as np
 from lerobot_excav.datasets.format.episode_table import EpisodeTable
 from lerobot_excav.datasets.format.schema import (
     COMMAND_KEY,
+    INTERVENTION_KEY,
     MASK_KEY,
     MASK_SOURCE_KEY,
+    OPERATOR_KEY,
+    OPERATORS,
     PAIR_KEY,
+    REST_KEY,
     SCENE_KEY,
     SIMULATION_KEY,
+    STAGE_KEY,
     TARGET_KEY,
     camera_key,
 )
@@ -32,6 +37,9 @@ ACTION_MARGIN = 0.1
 environments clip it. More speaks of another unit (guess)."""
 
 
+MOST_REST_FRAMES = 100_000
+"""As many as a demonstration may have at all."""
+
 MASK_WORDS = re.compile(
     rf"[^,]+(, ({'|'.join(MASK_CONDITIONS[1:])}))?(, ({'|'.join(MASK_NOISES[1:])}) [1-9][0-9]* px)?(, {OVERLAY})?"
 )
@@ -42,7 +50,7 @@ def fact_problems(episode: EpisodeTable) -> Iterator[str]:
     """Describe in plain words which facts of an episode, that have all columns, contradict each other or cannot be."""
     for find in (
         *(_task_problems, _version_problems, _pair_problems, _command_problems),
-        *(_setting_problems, _mask_word_problems, _outcome_problems),
+        *(_setting_problems, _mask_word_problems, _outcome_problems, _operator_problems),
     ):
         try:
             yield from find(episode)
@@ -81,6 +89,8 @@ def _pair_problems(episode: EpisodeTable) -> Iterator[str]:
         yield f"{PAIR_KEY}={pair.uid!r} has an unknown scene set; allowed: {', '.join(SCENE_SETS)}"
     if pair.scene_id > LAST_SCENE:
         yield f"{SCENE_KEY}={pair.scene_id} is not possible; the last scene is {LAST_SCENE}"
+    if not 0 <= pair.stage <= (last := episode.spec.last_stage):
+        yield f"{STAGE_KEY}={pair.stage} is not possible; the last stage is {last}"
     wrong = [target for target in np.unique(episode.target_id).tolist() if not 0 <= target < targets]
     if wrong:
         yield f"{TARGET_KEY}={wrong[0]} is not possible; allowed are 0 to {targets - 1}"
@@ -99,8 +109,21 @@ def _mask_word_problems(episode: EpisodeTable) -> Iterator[str]:
 
 
 def _outcome_problems(episode: EpisodeTable) -> Iterator[str]:
-    _ = episode.success  # one per episode
-    yield from ()
+    _ = episode.success, episode.outcome  # one per episode
+    most = MOST_REST_FRAMES if episode.spec.cuts_rest else 0
+    if not 0 <= episode.rest_frames <= most:
+        yield f"{REST_KEY}={episode.rest_frames} is not possible; allowed are 0 to {most}"
+
+
+def _operator_problems(episode: EpisodeTable) -> Iterator[str]:
+    if episode.operator not in OPERATORS:
+        yield f"{OPERATOR_KEY}={episode.operator!r:.100} is not known; allowed: {', '.join(OPERATORS)}"
+    elif episode.operator != "policy" and episode.intervention.any():
+        frame = int(np.argmax(episode.intervention))
+        yield (
+            f"{INTERVENTION_KEY} is true at frame {frame}, though {OPERATOR_KEY}={episode.operator!r}: there was no "
+            "policy to take over from"
+        )
 
 
 def action_problems(episode: EpisodeTable) -> Iterator[str]:

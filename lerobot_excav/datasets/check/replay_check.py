@@ -19,8 +19,7 @@ def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
         recorded.schedule,
         fps=fps,
         columns=recorded.settings,
-        # The operator's rest may have been cut off, and a success is final only after it.
-        then_hold=spec.cuts_rest and recorded.success,
+        rest_frames=recorded.rest_frames,
     )
     largest, frame = state_deviation(played, recorded)
     if largest > STATE_TOLERANCE:
@@ -28,7 +27,7 @@ def replay_problem(recorded: EpisodeTable, *, fps: int) -> str:
             f"replay leaves the recorded state at frame {frame} (up to {largest:.3g} rad) with MuJoCo "
             f"{package_versions()['mujoco']}; another version may differ, see packages in {PROVENANCE_PATH}"
         )
-    task = np.abs(played.task_state - recorded.task_state)
+    task = np.abs(np.vstack([played.task_state, played.outcome]) - np.vstack([recorded.task_state, recorded.outcome]))
     if task.max() > spec.task_state_tolerance:
         name = spec.task_state_names[int(np.argmax(task.max(axis=0)))]
         return f"replay gives another {name} (by up to {task.max():.3g})"

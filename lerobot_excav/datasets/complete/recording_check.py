@@ -84,6 +84,20 @@ def require_completable(root: Path, session: dict[int, SessionEpisode]) -> None:
             )
 
 
+def require_operator(session: dict[int, SessionEpisode], operator: str) -> None:
+    """Check that a session does not say that somebody else commanded.
+
+    Raises:
+        DatasetError: It does.
+    """
+    others = [index for index, episode in session.items() if episode.operator not in (None, operator)]
+    if others:
+        raise DatasetError(
+            f"--operator={operator}, but the session says that the scripted operator commanded episodes {others}; "
+            "leave the option out"
+        )
+
+
 def whole_episodes(session: dict[int, SessionEpisode], total: int, *, skip_restarted: bool) -> list[int]:
     """Return the episodes of a recording in which the scene was not restarted and no mask was waited for.
 

@@ -16,6 +16,7 @@ from lerobot.datasets import LeRobotDataset, add_features, delete_episodes
 from lerobot_excav.datasets.complete.exchange import copy_foreign_files, exchange, require_free, workspace
 from lerobot_excav.datasets.complete.recording_check import (
     require_completable,
+    require_operator,
     require_readable,
     require_recorded_targets,
     whole_episodes,
@@ -36,7 +37,12 @@ STATE_TOLERANCE = 1e-4
 
 
 def complete_recording(
-    root: Path, session_path: Path, *, out: Path | None = None, skip_restarted: bool = False
+    root: Path,
+    session_path: Path,
+    *,
+    out: Path | None = None,
+    skip_restarted: bool = False,
+    operator: str | None = None,
 ) -> Path:
     """Add the `excav.*` columns to a recording, and its index.
 
@@ -45,6 +51,7 @@ def complete_recording(
         session_path: Session log of the simulated robot.
         out: Where to put the completed dataset; it replaces `root` by default.
         skip_restarted: Whether to leave out episodes in which the scene was restarted, instead of refusing them.
+        operator: Who commanded, one of `schema.OPERATORS`; by default a person, or whom the session names.
 
     Returns:
         Folder of the completed dataset.
@@ -59,6 +66,8 @@ def complete_recording(
     session = read_session(session_path)
     require_readable(root)
     require_completable(root, session)
+    if operator is not None:
+        require_operator(session, operator)
     whole = whole_episodes(session, read_info(root).total_episodes, skip_restarted=skip_restarted)
     with workspace(beside=out or root) as folder:
         completed = folder / "completed"
@@ -67,7 +76,7 @@ def complete_recording(
         renumbered = {number: session[index] for number, index in enumerate(whole)}
         require_recorded_targets(reduced, renumbered)
         episodes = _resimulate_all(reduced, renumbered)
-        _write_completed(reduced, episodes, renumbered, completed)
+        _write_completed(reduced, episodes, renumbered, completed, operator or "person")
         write_statistics(completed, schema.excav_features(read_info(completed).spec))
         write_index(completed)
         if out is not None:
@@ -126,9 +135,14 @@ def state_deviation(played: Episode, recorded: EpisodeTable) -> tuple[float, int
     return float(deviation.max()), int(np.argmax(deviation > STATE_TOLERANCE))
 
 
-def _write_completed(root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path) -> None:
-    """Copy a dataset with the new columns, by LeRobot's own tool."""
-    constant = {i: constant_columns(episode, session[i].task_settings) for i, episode in episodes.items()}
+def _write_completed(
+    root: Path, episodes: dict[int, Episode], session: dict[int, SessionEpisode], out: Path, operator: str
+) -> None:
+    """Copy a dataset with the new columns, by LeRobot's own tool; the operator is that of whom the log says nothing."""
+    constant = {
+        i: constant_columns(episode, session[i].task_settings, session[i].operator or operator)
+        for i, episode in episodes.items()
+    }
     varying = {
         schema.TARGET_KEY: "target_id",
         schema.COMMAND_KEY: "command_frame",

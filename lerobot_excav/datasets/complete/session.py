@@ -12,6 +12,7 @@ from lerobot_excav.datasets.complete.session_events import (
     EpisodeEvent,
     Event,
     HeldEvent,
+    OperatorEvent,
     RestartEvent,
     SessionEvent,
     read_events,
@@ -64,6 +65,7 @@ class SessionEpisode:
         runs: What was done; a restart begins another run.
         restarts: Numbers of actions after which the scene was restarted, or the machine held until its mask was found.
         end: How it ended: `ended`, `stopped`, or None where the log breaks off.
+        operator: Who commanded, if the log says so: `scripted`.
     """
 
     episode_index: int
@@ -72,6 +74,7 @@ class SessionEpisode:
     runs: list[Run]
     restarts: list[int] = field(default_factory=list)
     end: str | None = None
+    operator: str | None = None
 
     @property
     def simulation_version(self) -> int:
@@ -182,6 +185,8 @@ class _Reader:
             case ActionEvent():
                 self._require_values(event, episode)
                 run.frames.append(event)
+            case OperatorEvent():
+                episode.operator = event.operator
             case HeldEvent():
                 episode.restarts.append(episode.frames)
             case CommandEvent():

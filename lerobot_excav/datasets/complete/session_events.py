@@ -50,7 +50,7 @@ class EpisodeEvent(_Event):
     event: Literal["episode"]
     episode_index: NonNegativeInt
     scene_id: int = Field(ge=0, le=LAST_SCENE)
-    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
+    stage: NonNegativeInt
     target_id: NonNegativeInt
 
 
@@ -69,6 +69,13 @@ class CommandEvent(_Event):
     target_id: NonNegativeInt
 
 
+class OperatorEvent(_Event):
+    """Another than a person commands this episode."""
+
+    event: Literal["operator"]
+    operator: Literal["scripted"]
+
+
 class HeldEvent(_Event):
     """The machine was held still until its mask was found."""
 
@@ -80,7 +87,7 @@ class RestartEvent(_Event):
 
     event: Literal["restart"]
     scene_id: int = Field(ge=0, le=LAST_SCENE)
-    stage: NonNegativeInt = 0  # logs of earlier releases do not name it
+    stage: NonNegativeInt
     target_id: NonNegativeInt
     state: Vector | None
     action: Vector | None
@@ -99,7 +106,17 @@ class DiscardEvent(_Event):
     event: Literal["discarded"]
 
 
-Event = SessionEvent | EpisodeEvent | ActionEvent | CommandEvent | HeldEvent | RestartEvent | EndEvent | DiscardEvent
+Event = (
+    SessionEvent
+    | EpisodeEvent
+    | OperatorEvent
+    | ActionEvent
+    | CommandEvent
+    | HeldEvent
+    | RestartEvent
+    | EndEvent
+    | DiscardEvent
+)
 _LINE: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
 
 

@@ -76,6 +76,31 @@ class EpisodeTable:
         return self.array(schema.TASK_STATE_KEY)
 
     @property
+    def outcome(self) -> NDArray[Any]:
+        """Task state at the end of the episode, (k,)."""
+        outcomes = self.array(schema.OUTCOME_KEY)
+        if (outcomes != outcomes[0]).any():
+            raise DatasetError(
+                f"episode {self.index}: {schema.OUTCOME_KEY} changes within the episode; it names the whole episode"
+            )
+        return np.asarray(outcomes[0])
+
+    @property
+    def rest_frames(self) -> int:
+        """How many frames the machine was held still after the last one."""
+        return int(self._constant(schema.REST_KEY))
+
+    @property
+    def operator(self) -> str:
+        """Who commanded, one of `OPERATORS`."""
+        return str(self._constant(schema.OPERATOR_KEY))
+
+    @property
+    def intervention(self) -> NDArray[Any]:
+        """Whether a person took over from the policy, (n,)."""
+        return self.array(schema.INTERVENTION_KEY)
+
+    @property
     def success(self) -> bool:
         """Outcome."""
         return bool(self._constant(schema.SUCCESS_KEY))

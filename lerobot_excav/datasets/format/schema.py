@@ -25,11 +25,22 @@ STAGE_KEY = "excav.stage"
 TARGET_KEY = "excav.target_id"
 PAIR_KEY = "excav.pair_uid"
 TASK_STATE_KEY = "excav.task_state"
+OUTCOME_KEY = "excav.outcome"
+"""Task state at the end of the episode: after its last action, and after the rest where that was left out."""
+REST_KEY = "excav.rest_frames"
+"""How many frames the machine was held still after the last one until the episode was over; they are left out."""
 SUCCESS_KEY = "excav.success"
+OPERATOR_KEY = "excav.operator"
+INTERVENTION_KEY = "excav.intervention"
+"""Whether a person took over from the policy in this frame."""
 MASK_SOURCE_KEY = "excav.mask_source"
 SIMULATION_KEY = "excav.simulation_version"
 COMMAND_KEY = "excav.command_frame"
 """Frame from which on the present command holds: a command may change and yet name a target of the same number."""
+
+
+OPERATORS = ("scripted", "person", "policy")
+"""Who may have commanded an episode."""
 
 
 @with_config(ConfigDict(extra="allow"))
@@ -76,7 +87,11 @@ def excav_features(spec: TaskSpec) -> dict[str, Feature]:
         COMMAND_KEY: _scalar("int64"),
         PAIR_KEY: _scalar("string"),
         TASK_STATE_KEY: _vector(spec.task_state_names),
+        OUTCOME_KEY: _vector(spec.task_state_names),
+        REST_KEY: _scalar("int64"),
         SUCCESS_KEY: _scalar("bool"),
+        OPERATOR_KEY: _scalar("string"),
+        INTERVENTION_KEY: _scalar("bool"),
         SIMULATION_KEY: _scalar("int64"),
         **{key: _scalar("string") for key in words},
     }

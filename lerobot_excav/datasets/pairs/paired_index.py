@@ -78,7 +78,9 @@ def _row(episode: EpisodeTable) -> dict[str, Any]:
         "length": episode.length,
         "success": episode.success,
         **_mask_summary(episode.image(schema.MASK_KEY, 0)),
-        **episode.spec.measures.outcome(episode.task_state),
+        **episode.spec.measures.outcome(np.vstack([episode.task_state, episode.outcome])),
+        "operator": episode.operator,
+        "intervention_frames": int(episode.intervention.sum()),
         "fingerprint": fingerprint(episode),
     }
 

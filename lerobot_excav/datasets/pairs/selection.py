@@ -28,11 +28,13 @@ def select(
     - `non-paired`: every scene once, targets as equally frequent as the scenes allow.
     - `balanced`: every target equally often, from whatever scenes have it.
 
+    A scene at another stage or on another soil counts as another scene.
+
     Scenes are chosen at random, but the same seed chooses the same, and a smaller choice is part of a larger one
     (except that `non-paired` may show a scene with another target).
 
     Args:
-        index: Rows to choose from, one per pair and soil; a scene on another soil counts as another scene.
+        index: Rows to choose from, one per pair and soil.
         composition: One of `COMPOSITIONS`.
         episodes: How many episodes; as many as possible by default.
         scenes: How many scenes, in place of `episodes`; only for `paired` and `non-paired`.

@@ -44,8 +44,8 @@ def split(rows: pd.DataFrame, unit: str, *, eval_fraction: float = 0.2, seed: in
 
     Args:
         rows: Rows of a paired-scene index.
-        unit: `scene` holds out whole scenes, on all soils, so none is in both parts; `episode` holds out single
-            episodes.
+        unit: `scene` holds out whole scenes, at all stages and on all soils, so none is in both parts; `episode` holds
+            out single episodes.
         eval_fraction: Part of the units to hold out, in [0, 1); at least one unit unless it is 0.
         seed: Seed of the choice.
 

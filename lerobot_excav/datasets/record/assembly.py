@@ -17,6 +17,9 @@ from lerobot_excav.datasets.record.episode import Episode
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 
+OPERATOR = "scripted"
+"""Who commands a demonstration."""
+
 # Encoding a picture releases the interpreter lock; two threads hide most of it behind the rest (measured).
 IMAGE_THREADS = 2
 
@@ -64,13 +67,20 @@ def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
     }
 
 
-def constant_columns(episode: Episode, settings: TaskSettings) -> dict[str, Any]:
-    """Return the `excav.*` columns that are the same in every frame of an episode played with these settings."""
+def constant_columns(episode: Episode, settings: TaskSettings, operator: str) -> dict[str, Any]:
+    """Return the `excav.*` columns that are the same in every frame of an episode played with these settings.
+
+    The operator is one of `OPERATORS`; nobody took over.
+    """
     return {
         schema.SCENE_KEY: episode.pair.scene_id,
         schema.STAGE_KEY: episode.pair.stage,
         schema.PAIR_KEY: episode.pair.uid,
+        schema.OUTCOME_KEY: episode.outcome,
+        schema.REST_KEY: episode.rest_frames,
         schema.SUCCESS_KEY: episode.success,
+        schema.OPERATOR_KEY: operator,
+        schema.INTERVENTION_KEY: False,
         schema.SIMULATION_KEY: task_of_settings(settings).simulation_version,
         schema.MASK_SOURCE_KEY: settings.mask_words,
         **{schema.setting_key(name): getattr(settings, name) for name in settings.columns()},
@@ -80,8 +90,8 @@ def constant_columns(episode: Episode, settings: TaskSettings) -> dict[str, Any]
 def append_episode(dataset: LeRobotDataset, episode: Episode, settings: DemonstrationSettings) -> None:
     """Add an episode to a dataset that is being written."""
     constant = {
-        key: value if isinstance(value, str) else np.array([value])
-        for key, value in constant_columns(episode, settings.env).items()
+        key: value if isinstance(value, str | np.ndarray) else np.array([value])
+        for key, value in constant_columns(episode, settings.env, OPERATOR).items()
     }
     for frame in range(episode.length):
         varying = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -41,7 +42,8 @@ class PlayedScenes:
         choices=tuple(range(1, TARGETS_PER_SCENE + 1)),
     )
     target_rule: str = setting(
-        "With one target: go round the targets from scene to scene, draw it, or take the one nearest at the start",
+        "With one target: go round the targets from start to start, draw it, or take the nearest: the block nearest to "
+        "the gripper, the region with the shortest swing to the box",
         default="round",
         choices=TARGET_RULES,
     )
@@ -61,8 +63,8 @@ class PlayedScenes:
         )
         require(
             self.target_rule != "nearest" or spec.nearest_target_entry is not None,
-            f"{option} has no meaning for --env.type={spec.env_type}, which tells no target as the nearest; "
-            "allowed: round, uniform",
+            f"{option} has no meaning for --env.type={spec.env_type} with {spec.id}, which tells no target as the "
+            "nearest; allowed: round, uniform",
         )
         require(
             self.first_scene + self.scenes - 1 <= LAST_SCENE,
@@ -88,26 +90,45 @@ class PlayedScenes:
         return self.env.episode_length or self.task_spec.length_at(self.env.fps)
 
     @property
+    def scene_ids(self) -> range:
+        """The scenes."""
+        return range(self.first_scene, self.first_scene + self.scenes)
+
+    @property
     def start_stages(self) -> tuple[int, ...]:
         """The stages that every scene is shown at, rising."""
         return (0,)
 
+    @property
+    def episode_count(self) -> int:
+        """How many episodes are to be played."""
+        return self.scenes * len(self.start_stages) * (self.targets or 1)  # it has been filled in
+
     def pairs(self) -> list[Pair]:
         """Return the episodes to play, in their order: those of a scene side by side, and of a stage within it."""
         return [
-            Pair(self.env.ENV_TYPE, self.env.scene_set, scene_id, stage, target_id)
-            for scene_id in range(self.first_scene, self.first_scene + self.scenes)
-            for place, stage in enumerate(self.start_stages)
-            for target_id in targets_of_start(
-                self.target_rule,
-                self.targets or 1,  # it has been filled in
-                seed=self.seed,
-                settings=self.env,
-                scene_id=scene_id,
-                stage=stage,
-                place=place,
-            )
+            pair
+            for scene_id in self.scene_ids
+            for stage in self.start_stages
+            for pair in self.pairs_of_start(scene_id, stage)
         ]
+
+    def pairs_of_start(self, scene_id: int, stage: int) -> list[Pair]:
+        """Return the episodes to play from a start; the nearest target of a later one takes long to find."""
+        targets = targets_of_start(
+            self.target_rule,
+            self.targets or 1,  # it has been filled in
+            seed=self.seed,
+            settings=self.env,
+            scene_id=scene_id,
+            stage=stage,
+            place=self.start_stages.index(stage),
+        )
+        return [self.pair(scene_id, stage, target_id) for target_id in targets]
+
+    def pair(self, scene_id: int, stage: int, target_id: int) -> Pair:
+        """Return the name of a start that is shown with a target."""
+        return Pair(self.env.ENV_TYPE, self.env.scene_set, scene_id, stage, target_id)
 
     def episode_seed(self, pair: Pair) -> tuple[int, ...]:
         """Return the entropy of the operator's generator in one episode."""
@@ -141,6 +162,11 @@ class DemonstrationSettings(PlayedScenes):
     def start_stages(self) -> tuple[int, ...]:
         """The stages that every scene is shown at, rising."""
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
+
+    def possible_pairs(self) -> list[Pair]:
+        """Return the episodes that may be played, whichever targets the rule chooses."""
+        targets = range(self.task_spec.target_count)
+        return [self.pair(*start, target) for start in product(self.scene_ids, self.start_stages) for target in targets]
 
     @classmethod
     def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import chain
 from pathlib import Path
 
 from PIL import UnidentifiedImageError
@@ -24,7 +24,7 @@ from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.datasets.record.partial_run import PartialRun
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.provenance import read_provenance, write_provenance
-from lerobot_excav.datasets.record.simulation import simulate_episodes
+from lerobot_excav.datasets.record.simulation import simulate_episodes, simulate_scene
 from lerobot_excav.datasets.record.workers import episode_results, require_workers, submit_episodes, worker_pool
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.whole_file import named
@@ -103,13 +103,12 @@ def _require_finished(out: Path, settings: DemonstrationSettings, *, resume: boo
 
 def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int, show_progress: bool) -> list[Outcome]:
     """Simulate what is missing and assemble everything in order."""
-    groups = _groups(settings.pairs())
     with (
         worker_pool(workers) as pool,
-        EpisodeProgress(sum(map(len, groups)), show=show_progress) as progress,
+        EpisodeProgress(settings.episode_count, show=show_progress) as progress,
         ExitStack() as stack,
     ):
-        futures = [_start(pool, progress, settings, group, partial.episodes) for group in groups]
+        futures = _start(pool, progress, settings, partial.episodes)
         # LeRobot takes seconds to load; by now the workers are at work.
         from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
 
@@ -117,17 +116,13 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
         # Else its threads go on writing into a folder that is given up.
         stack.callback(dataset.writer.stop_image_writer)
         outcomes = []
-        for group, future in zip(groups, futures, strict=True):
-            episode_results(future)
-            for pair in group:
-                outcome = EpisodeStore(partial.episodes).outcome(pair)
-                assert outcome is not None  # it was just written, or found
-                if outcome["kept"]:
-                    episode = EpisodeStore(partial.episodes).read(pair)
-                    with _errors_name(partial.dataset):
-                        append_episode(dataset, episode, settings)
-                    progress.count_written()
-                outcomes.append(outcome)
+        for outcome in chain.from_iterable(map(episode_results, futures)):
+            if outcome["kept"]:
+                episode = EpisodeStore(partial.episodes).read(Pair.parse(outcome["pair_uid"]))
+                with _errors_name(partial.dataset):
+                    append_episode(dataset, episode, settings)
+                progress.count_written()
+            outcomes.append(outcome)
     _require_any(outcomes, partial.folder)
     with _errors_name(partial.dataset):
         dataset.finalize()
@@ -169,25 +164,26 @@ def _require_any(outcomes: list[Outcome], folder: Path) -> None:
     )
 
 
-def _groups(pairs: list[Pair]) -> list[list[Pair]]:
-    """Return the episodes that one process plays: one by one, or all of a scene, whose stages it reaches only once."""
-    if all(pair.stage == 0 for pair in pairs):
-        return [[pair] for pair in pairs]
-    return [list(scene) for _, scene in groupby(pairs, key=lambda pair: pair.scene_id)]
-
-
 def _start(
-    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, group: list[Pair], folder: Path
+    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, folder: Path
+) -> list[Future[list[Outcome]]]:
+    """Submit all episodes in their order: one by one, or scene by scene where stages of a scene are to be reached."""
+    if settings.start_stages != (0,):
+        return [submit_episodes(pool, progress, simulate_scene, settings, i, folder) for i in settings.scene_ids]
+    return [_start_one(pool, progress, settings, pair, folder) for pair in settings.pairs()]
+
+
+def _start_one(
+    pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, pair: Pair, folder: Path
 ) -> Future[list[Outcome]]:
-    """Submit those episodes of a group that are not finished already."""
-    missing = [pair for pair in group if EpisodeStore(folder).outcome(pair) is None]
-    for _ in range(len(group) - len(missing)):
-        progress.skip()
-    if not missing:
-        future: Future[list[Outcome]] = Future()
-        future.set_result([])
-        return future
-    return submit_episodes(pool, progress, simulate_episodes, settings, missing, folder)
+    """Submit an episode, unless it is finished already."""
+    finished = EpisodeStore(folder).outcome(pair)
+    if finished is None:
+        return submit_episodes(pool, progress, simulate_episodes, settings, pair, folder)
+    progress.skip()
+    future: Future[list[Outcome]] = Future()
+    future.set_result([finished])
+    return future
 
 
 def _is_absent(outcome: Outcome) -> bool:

@@ -1,5 +1,6 @@
 """One played episode: how it is driven and what is kept of it."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,6 +30,8 @@ class Episode:
         target_id: Target that is commanded, (n,) int64.
         command_frame: Frame from which on the command holds, (n,) int64.
         task_state: How far the task is, (n, k) float32.
+        outcome: How far the task is after the last action, and after the rest, (k,) float32.
+        rest_frames: How many frames the machine was held still after the last action until the episode ended.
         success: Outcome of the episode.
         mask_missing_frames: Frames in which the machine was held still because no mask was found.
         metrics: Outcome part by part, after the last action.
@@ -42,6 +45,8 @@ class Episode:
     target_id: NDArray[Any]
     command_frame: NDArray[Any]
     task_state: NDArray[Any]
+    outcome: NDArray[Any]
+    rest_frames: int
     success: bool
     mask_missing_frames: int
     metrics: dict[str, Any]
@@ -66,11 +71,11 @@ def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) ->
 
     episode = _play(env, pair, dict(pair.reset_options), reset=lambda: operator.reset(env), act=act)
     at_work = [frame for frame, is_rest in enumerate(rests) if not is_rest]
-    return _first_frames(episode, 1 + max(at_work, default=0))
+    return _without_rest(episode, 1 + max(at_work, default=0))
 
 
 def replay(
-    env: MaskedTaskEnv[Any, Any], action: NDArray[Any], pair: Pair, schedule: Schedule, *, then_hold: bool = False
+    env: MaskedTaskEnv[Any, Any], action: NDArray[Any], pair: Pair, schedule: Schedule, *, rest_frames: int = 0
 ) -> Episode:
     """Play recorded actions again, all of them: a person may go on after the environment says that it is over.
 
@@ -79,7 +84,8 @@ def replay(
         action: Actions, (n, a) float32.
         pair: Start and target.
         schedule: Changes of the command.
-        then_hold: Whether the machine is held still after them until the environment says that it is over.
+        rest_frames: For how many frames the machine is held still after them, unless the environment says before that
+            it is over.
 
     Returns:
         The episode, without the frames in which the machine was held. Its `metrics` are empty unless the environment
@@ -90,8 +96,9 @@ def replay(
     def act(frame: int) -> NDArray[Any]:
         return np.asarray(action[frame] if frame < len(action) else env.holding_action())
 
-    episode = _play(env, pair, options, reset=lambda: None, act=act, least=len(action), goes_on=then_hold)
-    return _first_frames(episode, len(action))
+    length = len(action)
+    episode = _play(env, pair, options, reset=lambda: None, act=act, least=length, most=length + rest_frames)
+    return _without_rest(episode, length)
 
 
 def _play(
@@ -102,15 +109,15 @@ def _play(
     reset: Callable[[], None],
     act: Callable[[int], NDArray[Any]],
     least: int = 0,
-    goes_on: bool = True,
+    most: float = math.inf,
 ) -> Episode:
-    """Play the least number of frames, and go on until the episode ends."""
+    """Play until the episode ends, but at least and at most so many frames."""
     observation, info = env.reset(options=options)
     reset()
     frames: list[dict[str, Any]] = []
     metrics: dict[str, Any] = {}
     success, ended = False, False
-    while len(frames) < least or (goes_on and not ended):
+    while len(frames) < least or (len(frames) < most and not ended):
         action = np.asarray(act(len(frames)), dtype=np.float32)
         frames.append(_frame(observation, info, action))
         observation, _, terminated, truncated, info = env.step(action)
@@ -123,6 +130,8 @@ def _play(
         pair=pair,
         task=env.task_description,
         images={camera: columns.pop(camera) for camera in cameras},
+        outcome=np.asarray(info["task_state"], dtype=np.float32),
+        rest_frames=0,
         success=success,
         mask_missing_frames=info["mask_missing_frames"],
         metrics=dict(metrics),
@@ -130,11 +139,11 @@ def _play(
     )
 
 
-def _first_frames(episode: Episode, count: int) -> Episode:
-    """Return an episode cut off after some frames; its outcome stays."""
+def _without_rest(episode: Episode, count: int) -> Episode:
+    """Return an episode cut off after some frames, in the others of which the machine was held still."""
     traces = {name: getattr(episode, name)[:count] for name in TRACES}
     images = {camera: frames[:count] for camera, frames in episode.images.items()}
-    return replace(episode, images=images, **traces)
+    return replace(episode, images=images, rest_frames=episode.length - count, **traces)
 
 
 def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any]) -> dict[str, Any]:

@@ -39,6 +39,8 @@ class Outcome(TypedDict):
     absent: NotRequired[bool]  # whether the start offers no such target, so that nothing was played
 
 
+_STORED = (*TRACES, "outcome", "rest_frames")
+
 _OUTCOME = TypeAdapter(Outcome)
 
 
@@ -97,6 +99,14 @@ class EpisodeStore:
             raise _damaged(path)
         return outcome
 
+    def pairs_of_start(self, start: Pair) -> list[Pair]:
+        """Return the finished episodes from the start of a pair, in the order of their targets."""
+        stem = self._path(start, "json").stem.rpartition("-")[0]
+        targets = (path.stem.rpartition("-")[2] for path in self._folder.glob(f"{stem}-*.json"))
+        return [
+            start._replace(target_id=target) for target in sorted(int(word) for word in targets if word.isdecimal())
+        ]
+
     def read(self, pair: Pair) -> Episode:
         """Read a finished episode whose frames were kept.
 
@@ -140,7 +150,7 @@ def _damaged(path: Path) -> DatasetError:
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
-    arrays = {"task": np.array(episode.task), **{name: getattr(episode, name) for name in TRACES}}
+    arrays = {"task": np.array(episode.task), **{name: np.asarray(getattr(episode, name)) for name in _STORED}}
     for camera, frames in episode.images.items():
         arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
     return arrays
@@ -152,7 +162,8 @@ def _frames(path: Path) -> dict[str, Any]:
         arrays = {key: stored[key] for key in stored.files}
     cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
     images = {camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras}
-    return {"task": str(arrays["task"]), "images": images, **{name: arrays[name] for name in TRACES}}
+    stored = {name: arrays[name] for name in _STORED}
+    return {"task": str(arrays["task"]), "images": images, **stored, "rest_frames": int(stored["rest_frames"])}
 
 
 def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

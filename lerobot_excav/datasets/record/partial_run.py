@@ -78,7 +78,7 @@ class PartialRun:
 
     def clear(self) -> None:
         """Remove what the run has written, after its dataset was moved away; what others put there is kept."""
-        EpisodeStore(self.episodes).remove(self._settings.pairs())
+        EpisodeStore(self.episodes).remove(self._settings.possible_pairs())
         for leftover in self.folder.iterdir():
             if unfinished(leftover) == SETTINGS:
                 leftover.unlink()

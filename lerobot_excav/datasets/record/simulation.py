@@ -3,7 +3,7 @@
 Workers load this module and what it imports; LeRobot, which takes seconds and a gigabyte per process, is not among it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -20,22 +20,39 @@ from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.selection import Schedule, TargetAbsentError
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import ExcavError
+from lerobot_excav.errors import DatasetError, ExcavError
 
 
-def simulate_episodes(settings: DemonstrationSettings, pairs: Sequence[Pair], folder: Path) -> list[Outcome]:
-    """Play episodes one after the other, as `simulate_episode` does, and return their outcomes; runs in a worker.
+def simulate_scene(settings: DemonstrationSettings, scene_id: int, folder: Path) -> list[Outcome]:
+    """Play all episodes of a scene that are not finished, and return the outcomes of all; runs in a worker.
+
+    Its stages are reached once, one after the other.
 
     Raises:
-        ExcavError: One could not be played; the message names it.
+        ExcavError: An episode could not be played; the message names it.
     """
     outcomes = []
-    for pair in pairs:
-        try:
-            outcomes.append(simulate_episode(settings, pair, folder))
-        except ExcavError as error:
-            raise ExcavError(f"{pair.uid}: {error}") from error
+    for stage in settings.start_stages:
+        # To find the nearest target of a later start is to reach it, so one that was found is not looked for again.
+        found = EpisodeStore(folder).pairs_of_start(settings.pair(scene_id, stage, 0))
+        is_known = settings.target_rule == "nearest" and len(found) == 1
+        for pair in found if is_known else settings.pairs_of_start(scene_id, stage):
+            outcomes += simulate_episodes(settings, pair, folder)
     return outcomes
+
+
+def simulate_episodes(settings: DemonstrationSettings, pair: Pair, folder: Path) -> list[Outcome]:
+    """Play an episode unless it is finished, and return its outcome in a list; runs in a worker.
+
+    Raises:
+        ExcavError: It could not be played; the message names it.
+    """
+    try:
+        return [EpisodeStore(folder).outcome(pair) or simulate_episode(settings, pair, folder)]
+    except DatasetError:
+        raise
+    except ExcavError as error:
+        raise ExcavError(f"{pair.uid}: {error}") from error
 
 
 def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
@@ -77,7 +94,7 @@ def play_again(
     *,
     fps: int,
     columns: Mapping[str, str],
-    then_hold: bool = False,
+    rest_frames: int = 0,
 ) -> Episode:
     """Play the recorded actions of an episode (n, a) again, without pictures and with its own commands.
 
@@ -88,12 +105,12 @@ def play_again(
         schedule: Changes of the command.
         fps: Frames per second.
         columns: Settings that datasets keep in every frame, by name.
-        then_hold: Whether the machine is then held still until the task is over, at most for its time limit.
+        rest_frames: For how many frames the machine is held still after them.
     """
-    length = len(action) + spec.length_at(fps) if then_hold else spec.replay_length(len(action))
+    length = spec.replay_length(len(action) + rest_frames)
     settings = spec.make_settings(scene_set=pair.scene_set, fps=fps, episode_length=length, **columns)
     with closing(make_environment(settings, with_images=False)) as env:
-        return replay(env, action, pair, schedule, then_hold=then_hold)
+        return replay(env, action, pair, schedule, rest_frames=rest_frames)
 
 
 _open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []

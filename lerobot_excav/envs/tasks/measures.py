@@ -185,7 +185,7 @@ class TaskMeasures:
         world: What two runs must share for a scene's number to mean the same scene, as text with fields in braces.
         simulation: Description of the simulation, as text with fields in braces.
         legend: Explains the columns, line by line; takes who the operator was, None without one.
-        outcome: Turns the task states of an episode, (n, k), into columns of the paired-scene index.
+        outcome: Turns the task states of an episode and of its end, (n + 1, k), into columns of the paired-scene index.
         summary: Describes the outcomes of an index in a few words.
         sentence: Says in one sentence what came of episodes; None leaves that to the table.
         figure_entry: Function that draws episodes into a picture file, what no table can show; None draws nothing.

@@ -89,6 +89,7 @@ def copy_frames(episode, source, frames=slice(None)):
         (MAIN, copy_frames(5, 9, slice(1)), {5: "starts with another view than episode 4 of the same scene"}),
         (STATE, set_element(5, 3, 1, 7.0), {5: "replay leaves the recorded state at frame 3"}),
         (TASK_STATE_KEY, set_element(5, 3, 1, 7.0), {5: "replay gives another frames_on_target (by up to 7)"}),
+        ("excav.outcome", set_frames([0.0, 9.0]), {5: "replay gives another frames_on_target"}),
         (SUCCESS_KEY, set_frames(value=False), {5: "replay ends with success=True, recorded False"}),
         ("excav.table", set_frames("ice"), {5: "replay leaves the recorded state at frame 1"}),
     ],

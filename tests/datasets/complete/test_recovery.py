@@ -89,7 +89,7 @@ def test_a_recovered_dataset_is_the_one_that_was_recorded(recordings, changing_d
         for name, value in recorded.meta.stats[key].items():
             np.testing.assert_allclose(recovered.meta.stats[key][name], value, rtol=1e-6)
     # And what follows works on it.
-    complete_recording(root, log)
+    complete_recording(root, log, operator="scripted")
     pd.testing.assert_frame_equal(build_index(root), build_index(changing_datasets[storage]))
 
 

@@ -81,7 +81,7 @@ def episode_statistics(root):
 
 
 def test_completing_a_recording_restores_what_the_simulation_knew(recording, session, paired_dataset, tmp_path):
-    out = complete_recording(recording, session(), out=tmp_path / "c")
+    out = complete_recording(recording, session(), out=tmp_path / "c", operator="scripted")
     pd.testing.assert_frame_equal(build_index(out), build_index(paired_dataset))
     for completed, original in zip(load(out), load(paired_dataset), strict=True):
         assert completed.keys() == original.keys()
@@ -101,10 +101,27 @@ def test_completing_a_recording_restores_what_the_simulation_knew(recording, ses
     assert write_index(tmp_path / "m")["pair_uid"].value_counts().tolist() == [2] * 19
 
 
+def test_who_commanded_is_a_person_unless_log_or_option_say_otherwise(small_datasets, tmp_path):
+    recording, log = make_recording(small_datasets["image"], tmp_path)
+    lines = log.read_text().splitlines(keepends=True)
+    second = [number for number, line in enumerate(lines) if '"episode"' in line][1]
+    lines.insert(second + 1, '{"event": "operator", "operator": "scripted"}\n')
+    plain, log = log, tmp_path / "noted.jsonl"
+    log.write_text("".join(lines))
+    by_person = complete_recording(recording, log, out=tmp_path / "person")
+    assert build_index(by_person)["operator"].tolist() == ["person", "scripted", "person", "person"]
+    with pytest.raises(DatasetError, match=r"--operator=policy, but .* scripted operator commanded episodes \[1\]"):
+        complete_recording(recording, log, out=tmp_path / "c", operator="policy")
+    assert main(["index", str(recording), f"--session={plain}", "--operator=policy", f"--out={tmp_path / 'p'}"]) == 0
+    index = build_index(tmp_path / "p")
+    assert index["operator"].tolist() == ["policy"] * 4
+    assert index["intervention_frames"].tolist() == [0] * 4
+
+
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_recording_with_changed_commands_is_completed_from_either_storage(changing_datasets, storage, tmp_path):
     recording, session = make_recording(changing_datasets[storage], tmp_path)
-    complete_recording(recording, session)
+    complete_recording(recording, session, operator="scripted")
     index = build_index(recording)
     pd.testing.assert_frame_equal(index, build_index(changing_datasets[storage]))
     assert (index["final_target_id"] == (index["target_id"] + 1) % 4).all()
@@ -114,7 +131,7 @@ def test_a_recording_of_corrupted_masks_is_completed(tmp_path):
     env = {"mask_condition": "zero", "table": "ice"}
     record_toy(tmp_path / "original", scenes=1, env=env)
     recording, session = make_recording(tmp_path / "original", tmp_path, env=env)
-    complete_recording(recording, session)
+    complete_recording(recording, session, operator="scripted")
     pd.testing.assert_frame_equal(build_index(recording), build_index(tmp_path / "original"))
 
 
@@ -186,7 +203,7 @@ def test_a_session_that_does_not_fit_is_refused(recording, session, tmp_path, ch
 
 def test_restarted_episodes_are_left_out_on_request(recording, paired_dataset, session, tmp_path):
     path = session({1: {"held": 3, "frames": 4}, 6: {"held": 0}})
-    out = complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True)
+    out = complete_recording(recording, path, out=tmp_path / "c", skip_restarted=True, operator="scripted")
     expected = build_index(paired_dataset).drop(index=[1, 6]).reset_index(drop=True)
     expected["episode_index"] = range(17)
     pd.testing.assert_frame_equal(build_index(out), expected)

@@ -18,10 +18,11 @@ SESSION = {
     "settings": toy_settings().env.as_dict(),
     "task": None,
 }
-EPISODE = {"event": "episode", "episode_index": 0, "scene_id": 0, "target_id": 0}
+EPISODE = {"event": "episode", "episode_index": 0, "scene_id": 0, "stage": 0, "target_id": 0}
+OPERATOR = {"event": "operator", "operator": "scripted"}
 ACTION = {"event": "action", "state": [0.5, 0.5], "action": [0.25, 0.0]}
 COMMAND = {"event": "command", "target_id": 1}
-RESTART = {"event": "restart", "scene_id": 0, "target_id": 0, "state": None, "action": None}
+RESTART = {"event": "restart", "scene_id": 0, "stage": 0, "target_id": 0, "state": None, "action": None}
 
 
 @pytest.fixture
@@ -45,6 +46,13 @@ def test_every_float32_comes_back_bit_for_bit(read, rng):
     assert np.array_equal(found.view(np.uint32), values.view(np.uint32))
 
 
+def test_who_drives_is_known_where_the_log_says_so_and_belongs_to_its_episode(read):
+    second = {**EPISODE, "episode_index": 1}
+    end = {"event": "ended", "frames": 1}
+    episodes = read(SESSION, EPISODE, OPERATOR, ACTION, end, second, ACTION)
+    assert [episode.operator for episode in episodes.values()] == ["scripted", None]
+
+
 def test_a_restart_begins_another_run_with_its_own_commands(read):
     frame = {"state": [0.5, 0.5], "action": [0.25, 0.0]}
     restart = {**RESTART, "target_id": 2, **frame}
@@ -62,6 +70,8 @@ def test_a_restart_begins_another_run_with_its_own_commands(read):
         (2, {"episode_index": -1}, "episode_index=-1: .*greater than or equal to 0"),
         (2, {"scene_id": -3}, "scene_id=-3: .*greater than or equal to 0"),
         (2, {"target_id": 9}, "target_id=9 .*from 0 to 3"),
+        (2, {"stage": 1}, "stage=1 .*from 0 to 0"),
+        (2, {"stage": -1}, "stage=-1: .*greater than or equal to 0"),
         (2, {"target_id": True}, "target_id=True: .*valid integer"),
         (2, {"colour": 1}, "colour is not known"),
         (1, {"simulation_version": "1"}, "simulation_version='1': .*valid integer"),
@@ -98,6 +108,9 @@ def test_an_impossible_value_is_named_with_line_field_and_what_is_allowed(read, 
         ([SESSION, EPISODE, COMMAND], 3, "commands: frame=0 .*from 1"),
         ([SESSION, EPISODE, ACTION, COMMAND, COMMAND], 5, "commands: frame=1 .*from 2"),
         ([SESSION, EPISODE, ACTION, {**COMMAND, "target_id": 7}], 4, "commands: target_id=7 .*from 0 to 3"),
+        ([SESSION, EPISODE, {**OPERATOR, "operator": "dog"}], 3, "operator='dog': .*'scripted'"),
+        ([SESSION, OPERATOR], 2, "event='operator' comes before the line of its episode"),
+        ([SESSION, EPISODE, ACTION, {**RESTART, "stage": 7}], 4, "stage=7 .*from 0 to 0"),
         ([SESSION, EPISODE, ACTION, {**RESTART, "target_id": 7}], 4, "target_id=7 .*from 0 to 3"),
         ([SESSION, "{", EPISODE], 2, "not JSON .* not the last line"),
         ([SESSION, EPISODE, "{"], 3, "not JSON .* not the last line"),

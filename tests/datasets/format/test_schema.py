@@ -73,6 +73,8 @@ def test_columns_of_the_schema_are_accepted(spec):
     ("key", "changes", "message"),
     [
         ("excav.mask_source", None, r"lacks excav\.mask_source"),
+        ("excav.stage", None, r"lacks excav\.stage.*earlier release has written has to be recorded again"),
+        ("excav.operator", None, r"lacks excav\.operator"),
         ("excav.target_id", {"dtype": "float32"}, "dtype='float32' instead of 'int64'"),
         ("action", {"shape": (9,)}, r"shape=\(9,\) instead of"),
         ("excav.task_state", {"names": ["x"]}, "names=.* instead of"),
@@ -111,12 +113,13 @@ def test_columns_of_another_task_are_refused():
 
 
 def test_pair_uid_reads_back():
-    pair = Pair("excavator", "test", 12, 3)
-    assert pair.uid == "excavator/test/12/0/3"
+    pair = Pair("excavator", "test", 12, 4, 3)
+    assert pair.uid == "excavator/test/12/4/3"
     assert Pair.parse(pair.uid) == pair
+    assert pair.reset_options == {"scene_id": 12, "stage": 4, "target_id": 3}
 
 
-@pytest.mark.parametrize("uid", ["", "excavator/test/12", "excavator/test/x/1", "a/b/1/2/3"])
+@pytest.mark.parametrize("uid", ["", "excavator/test/12", "excavator/test/12/3", "excavator/test/0/x/1", "a/b/1/2/3/4"])
 def test_a_malformed_pair_uid_is_named(uid):
     with pytest.raises(DatasetError, match="is not of the form"):
         Pair.parse(uid)

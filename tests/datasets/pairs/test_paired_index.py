@@ -30,6 +30,7 @@ def test_the_index_describes_every_episode(paired_dataset):
         "pair_uid": "toy_reach/train/1/0/2",
         "scene_set": "train",
         "scene_id": 1,
+        "stage": 0,
         "target_id": 2,
         "final_target_id": 2,
         "commands": 1,
@@ -37,6 +38,8 @@ def test_the_index_describes_every_episode(paired_dataset):
         "table": "wood",
         "mask_source": "oracle",
         "success": True,
+        "operator": "scripted",
+        "intervention_frames": 0,
         "qc": "unchecked",
     }
     assert row[list(expected)].to_dict() == expected
@@ -48,8 +51,8 @@ def test_the_index_describes_every_episode(paired_dataset):
 def test_missing_and_duplicate_targets_are_found(paired_dataset):
     index = build_index(paired_dataset)
     coverage = pair_coverage(index)
-    assert (coverage.scenes, coverage.targets, coverage.complete_scenes) == (5, 4, 4)
-    assert coverage.missing == {"toy_reach/train/3": [1]}
+    assert (coverage.scenes, coverage.starts, coverage.targets, coverage.complete_starts) == (5, 5, 4, 4)
+    assert coverage.missing == {"toy_reach/train/3/0": [1]}
     assert coverage.duplicates == {}
     twice = pd.concat([index, index.iloc[[2]].assign(episode_index=19)])
     assert pair_coverage(twice).duplicates == {"toy_reach/train/0/0/2": [2, 19]}

@@ -22,6 +22,7 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
             "task": "Reach-v0",
             "keep_out": "none",
             "scene_id": scene,
+            "stage": 0,
             "target_id": target,
             "soil": "sand",
             "success": True,
@@ -125,8 +126,35 @@ def test_a_scene_on_another_soil_is_another_start_but_held_out_with_it():
     assert len(select(index, "paired")) == 18
     assert len(select(index, "non-paired")) == 10
     coverage = pair_coverage(index)
-    assert (coverage.scenes, coverage.duplicates) == (10, {})
-    assert coverage.missing == {"excavator/train/0 on sand": [1]}
+    assert (coverage.scenes, coverage.starts, coverage.duplicates) == (5, 10, {})
+    assert coverage.missing == {"excavator/train/0/0 on sand": [1]}
+
+
+def at_stages(pairs, *stages):
+    """Make an index in which every pair is shown at each of these stages."""
+    uid = "excavator/train/{0.scene_id}/{0.stage}/{0.target_id}"
+    index = pd.concat([index_of(pairs, stage=stage) for stage in stages], ignore_index=True)
+    return index.assign(episode_index=range(len(index)), pair_uid=[uid.format(row) for row in index.itertuples()])
+
+
+def test_a_scene_at_another_stage_is_another_start_but_held_out_with_it():
+    index = at_stages([(scene, target) for scene in range(5) for target in range(4)], 0, 4)
+    assert len(usable(index)) == len(select(index, "paired")) == 40
+    assert len(select(index, "non-paired")) == 10
+    parts = split(index, "scene", eval_fraction=0.2)
+    held_out = index[index["episode_index"].isin(parts.evaluation)]
+    assert sorted(held_out["stage"]) == [0] * 4 + [4] * 4
+    assert held_out["scene_id"].nunique() == 1
+
+
+def test_a_later_start_may_have_fewer_targets_but_none_in_between_may_be_missing():
+    whole = [(0, target) for target in range(4)]
+    index = pd.concat([at_stages(whole, 0, 4), at_stages([(1, 0), (1, 1)], 4), at_stages([(2, 0), (2, 2)], 4)])
+    coverage = pair_coverage(index.assign(episode_index=range(len(index))))
+    assert (coverage.scenes, coverage.starts, coverage.complete_starts) == (3, 4, 3)
+    assert coverage.missing == {"excavator/train/2/4": [1]}
+    assert pair_coverage(at_stages([(0, 0), (0, 1), (1, 0)], 0)).missing == {"excavator/train/1/0": [1]}
+    assert select(index, "paired")["scene_id"].tolist() == [0] * 8
 
 
 def test_where_no_setting_changes_the_start_scenes_are_paired_by_number_alone():

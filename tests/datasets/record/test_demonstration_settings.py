@@ -34,6 +34,29 @@ def test_one_target_per_scene_goes_round_the_targets():
     assert targets_of("excavator", scenes=8) == [0, 1, 2, 3, 0, 1, 2, 3]
 
 
+def test_every_scene_is_shown_at_every_stage_with_all_its_targets():
+    pairs = make("excavator", scenes=3, targets=2, stages="8, 0,4").pairs()
+    assert len(set(pairs)) == len(pairs) == 3 * 3 * 2
+    assert [(pair.scene_id, pair.stage) for pair in pairs[::2]] == [(s, k) for s in range(3) for k in (0, 4, 8)]
+    assert [pair for pair in pairs if pair.stage == 0] == make("excavator", scenes=3, targets=2).pairs()
+    assert make("excavator", stages="8, 0,4").as_record()["stages"] == "0,4,8"
+
+
+def test_with_one_target_the_stages_of_a_scene_go_round_the_targets_too():
+    targets = targets_of("excavator", scenes=4, stages="0,4,8,12")
+    assert targets == [0, 1, 2, 3, 1, 2, 3, 0, 2, 3, 0, 1, 3, 0, 1, 2]
+    drawn = targets_of("excavator", scenes=200, stages="0,4", target_rule="uniform")
+    assert drawn[::2] == targets_of("excavator", scenes=200, target_rule="uniform")
+    assert 20 < sum(early == late for early, late in zip(drawn[::2], drawn[1::2], strict=True)) < 80
+
+
+def test_the_operator_has_a_seed_of_its_own_at_every_stage():
+    settings = make("excavator", scenes=2, stages="0,1,2", seed=7)
+    seeds = [settings.episode_seed(pair) for pair in settings.pairs()]
+    assert len(set(seeds)) == len(seeds)
+    assert seeds[0] == (7, 0, 0)  # as without stages
+
+
 def test_drawn_targets_are_equally_likely_and_belong_to_their_scene():
     targets = targets_of("excavator", scenes=400, target_rule="uniform")
     assert min(Counter(targets).values()) > 70  # 100 each, 3.5 standard deviations below
@@ -42,10 +65,10 @@ def test_drawn_targets_are_equally_likely_and_belong_to_their_scene():
     assert targets_of("excavator", {"scene_set": "val"}, scenes=400, target_rule="uniform") != targets
 
 
-@pytest.mark.parametrize("env_type", ["fr5_grasp", "toy_reach"])
+@pytest.mark.parametrize("env_type", ["excavator", "fr5_grasp", "toy_reach"])
 def test_the_nearest_target_is_that_of_the_scene(env_type):
     spec = env_types()[env_type]
-    nearest = [spec.nearest_target("train", scene_id) for scene_id in range(5)]
+    nearest = [spec.nearest_target(spec.make_settings(), scene_id) for scene_id in range(5)]
     assert targets_of(env_type, scenes=5, target_rule="nearest") == nearest
     assert nearest != targets_of(env_type, scenes=5)
 
@@ -53,7 +76,17 @@ def test_the_nearest_target_is_that_of_the_scene(env_type):
 @pytest.mark.parametrize(
     ("env_type", "env", "settings", "message"),
     [
-        ("excavator", {}, {"targets": 1, "target_rule": "nearest"}, "--target_rule=nearest has no meaning for"),
+        (
+            "excavator",
+            {"task": "Clear-v0"},
+            {"target_rule": "nearest"},
+            "--target_rule=nearest has no meaning for --env.type=excavator with Clear-v0",
+        ),
+        ("excavator", {}, {"stages": "0,16"}, "--stages=16 is not possible; give a whole number from 0 to 15"),
+        ("excavator", {}, {"stages": "4,0,4"}, "--stages='4,0,4' names a stage twice"),
+        ("excavator", {}, {"stages": "0,-1"}, "--stages='0,-1' is not possible; give whole numbers with commas"),
+        ("excavator", {}, {"stages": ""}, "--stages='' is not possible"),
+        ("toy_reach", {}, {"stages": "0,1"}, "Scenes of Reach-v0 have no stages; leave --stages out"),
         ("excavator", {}, {"targets": 2, "target_rule": "uniform"}, "--target_rule=uniform chooses a single"),
         ("excavator", {"soil": PRESETS["sand"]}, {}, "cannot be kept in a dataset; give it by name"),
         ("fr5_grasp", {"soil": "sand"}, {}, "--env.soil is not a setting of fr5_grasp"),
