@@ -12,20 +12,20 @@ from lerobot_excav.envs.tasks.planner.keep_out import is_barred
 from lerobot_excav.envs.tasks.planner.surface import SeenSurface
 from lerobot_excav.envs.tasks.planner.zones import Zone
 from lerobot_excav.envs.tasks.scoop.feasibility import PATCH_SIZE_M
+from lerobot_excav.envs.tasks.scoop.operator.dig import end_radius_m
 
-RADIUS_RANGE_M = (3.3, 6.2)
-"""Distance of a region's centre from the swing axis [m] (kind: tuned, on other piles of the same kind)."""
+RADIUS_RANGE_M = (2.9, 6.2)
+"""Distance of a region's centre from the swing axis [m] (kind: tuned on train scenes). Near the machine lies what the
+cuts before have pushed there."""
 
-# The cut that is imagined at every place (kind: tuned there, as all below).
-CUT_LENGTH_M = 1.5
+# The cut that is imagined at every place (kind: tuned on train scenes, as all below).
+CUT_LENGTH_M = 2.5
 CUT_DEPTH_M = 0.41
 ENTRY_LENGTH_M = 0.35
 """Length over which the edge goes down to that depth [m]."""
 ENTRY_AHEAD_M = 0.08
 """How far behind the centre of the region the cut begins, seen from the machine [m]."""
-FLOOR_CLEARANCE_M = 0.03
-LEAST_CUT_RADIUS_M = 2.8
-"""Nearer to the swing axis nothing is cut [m]."""
+FLOOR_CLEARANCE_M = 0.01
 FULL_BUCKET_M3 = 0.42
 """More soil along the cut makes a place no better [m3]."""
 LENGTH_COST_M2 = 0.02
@@ -42,7 +42,7 @@ LEAST_SWEPT_M3 = 0.03
 LEAST_SEEN_SHARE = 0.5
 """Part of the cut's cells that has to be seen (kind: guess)."""
 
-KEEP_OUT_RADIUS_M = 2.5
+KEEP_OUT_RADIUS_M = 2.0
 """How far towards the machine the bucket may go while it cuts or is drawn in; a keep-out zone bars all of it [m]."""
 
 _STEP_M = 0.05
@@ -96,7 +96,7 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
     radii = radius[:, None] + ENTRY_AHEAD_M - gone
     surface_m, seen_share = _along_the_cut(surface, radii, swing)
     floor_m = np.maximum(surface_m - CUT_DEPTH_M * np.minimum(gone / ENTRY_LENGTH_M, 1.0), FLOOR_CLEARANCE_M)
-    cut_m = np.where(radii >= LEAST_CUT_RADIUS_M, np.maximum(surface_m - floor_m, 0.0), 0.0)
+    cut_m = np.where(radii >= end_radius_m(radii[:, :1]), np.maximum(surface_m - floor_m, 0.0), 0.0)
     swept_m3 = np.cumsum(cut_m, axis=1) * _STEP_M * BUCKET_INNER_WIDTH_M
     total_m3 = np.minimum(swept_m3[:, -1], FULL_BUCKET_M3)
     begun = swept_m3 >= ONSET_M3

@@ -90,7 +90,7 @@ def test_no_region_and_no_cut_path_touches_a_keep_out_zone(scene_id, x, y, width
     for target in plan.targets:
         # A dense sample of the region and of the way from it towards the machine.
         radius = np.hypot(*(target.center_w[:2] - MACHINE_POS_W[:2]))
-        along, across = np.meshgrid(np.arange(2.5 - radius, 0.4, 0.02), np.arange(-0.4, 0.41, 0.02))
+        along, across = np.meshgrid(np.arange(2.0 - radius, 0.4, 0.02), np.arange(-0.4, 0.41, 0.02))
         cos, sin = np.cos(target.yaw_rad), np.sin(target.yaw_rad)
         x_w = target.center_w[0] + along * cos - across * sin
         y_w = target.center_w[1] + along * sin + across * cos

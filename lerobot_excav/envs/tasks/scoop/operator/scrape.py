@@ -1,4 +1,4 @@
-"""The scrape: thin soil drawn together along the floor, with the bucket flat, and rolled in at the end."""
+"""The scrape: soil of little height drawn together along the floor, with the bucket flat, and rolled in at the end."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,10 @@ FLOOR_CLEARANCE_M = 0.002
 """Height of the lowest point of the shell over the rigid floor [m]; the edge is a plate's thickness higher."""
 FLOOR_M = 0.02
 """Height of the edge at which it counts as down [m]: that of the level plate on the floor."""
-VOLUME_M3 = 0.30
+VOLUME_M3 = 0.40
 """Soil to sweep at the most [m3]: along the floor a bucket loads less than in a cut, and pushes the rest ahead."""
 ROLL_LENGTH_M = 0.3
 """Way of the edge while the bucket is rolled in [m]."""
-FAR_END_RADIUS_M = 3.0
-LONG_WAY_M = 1.5
-"""A way so long may end at `FAR_END_RADIUS_M`: what is pushed ahead stays where a later one can take it [m]."""
 _SMOOTHING = 5
 """Twice over so many points is the path smoothed."""
 
@@ -51,10 +48,9 @@ def plan_scrape(section: Section, variation: Variation) -> list[BucketPose]:
 def _edge_heights(section: Section, variation: Variation) -> NDArray[np.float64]:
     """Return the height of the edge [m], shape (k,), down to the floor until enough is swept or the soil ends."""
     way_m = section.radii_m[0] - section.radii_m
-    surface_m = section.mean_m[(section.radii_m > FAR_END_RADIUS_M) | (way_m < LONG_WAY_M)]
-    ramp = np.minimum(way_m[: surface_m.size] / ENTRY_LENGTH_M, 1.0)
-    heights = np.maximum(surface_m - variation.depth_m * ramp, FLOOR_M)
-    swept_m3 = np.cumsum(np.maximum(surface_m - heights, 0.0)) * STEP_M * BUCKET_INNER_WIDTH_M
+    ramp = np.minimum(way_m / ENTRY_LENGTH_M, 1.0)
+    heights = np.maximum(section.mean_m - variation.depth_m * ramp, FLOOR_M)
+    swept_m3 = np.cumsum(np.maximum(section.mean_m - heights, 0.0)) * STEP_M * BUCKET_INNER_WIDTH_M
     last = int(np.argmax(swept_m3 >= min(VOLUME_M3, float(swept_m3[-1]) - 1e-9)))
     return np.asarray(heights[: max(last + 1, 3)])
 

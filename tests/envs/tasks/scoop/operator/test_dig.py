@@ -40,7 +40,7 @@ def scraped(thickness_m, *, radius_m=5.5, style=STYLES[0]):
 @given(
     seed=st.integers(0, 10_000),
     thickness_m=st.floats(0.0, 1.2),
-    radius_m=st.floats(3.0, 6.4),
+    radius_m=st.floats(2.9, 6.4),
     swing_rad=st.floats(-0.7, 0.7),
 )
 @settings(max_examples=60, deadline=None)
