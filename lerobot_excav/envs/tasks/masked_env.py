@@ -234,7 +234,11 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         super().reset(seed=seed)
         rng, length = self.np_random, self.episode_length
         selection = self._selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
-        self._start(selection.scene_id, selection.target_id)
+        try:
+            self._start(selection.scene_id, selection.target_id)
+        except BaseException:
+            self._selection = None  # so that a step says that there is no episode
+            raise
         self._frame = self._missing_frames = 0
         self._commands, self._main_img, self._picture, self._is_over = [], None, None, False
         self._give_command(selection.target_id)
@@ -293,7 +297,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
 
     def other_commands(self) -> list[Command]:
         """Return what else could be commanded in this scene, in the order of the targets."""
-        others = [i for i in range(self._target_count) if i != self.target_id]
+        others = (i for i in range(self._target_count) if i != self.target_id)
         return [Command(target_id=i, region=self._region(i), since_frame=self._frame) for i in others]
 
     # The command and its mask.
@@ -340,12 +344,10 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         return self.obs_type == "pixels_agent_pos"
 
     def _observe(self) -> dict[str, Any]:
-        observation: dict[str, Any] = {"agent_pos": self.agent_pos}
-        if self.obs_type == "state":
-            observation["environment_state"] = self.environment_state
-        if self._shows_pixels:
-            observation["pixels"] = {camera: self._draw(camera) for camera in self.task_spec.cameras}
-        return observation
+        state = {"environment_state": self.environment_state} if self.obs_type == "state" else {}
+        cameras = self.task_spec.cameras if self._shows_pixels else ()
+        pixels = {camera: self._draw(camera) for camera in cameras}
+        return {"agent_pos": self.agent_pos, **state, **({"pixels": pixels} if pixels else {})}
 
     def _draw(self, camera: str) -> NDArray[np.uint8]:
         if camera == "target_mask":
@@ -369,11 +371,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             "mask_missing": self.mask_missing,
             "mask_missing_frames": self._missing_frames,
         }
-        if self.depth_info:
-            info["depth_m"] = self.depth_m()
-        if is_over:
-            info["episode_metrics"] = self._episode_metrics()
-        return info
+        info |= {"depth_m": self.depth_m()} if self.depth_info else {}
+        return info | ({"episode_metrics": self._episode_metrics()} if is_over else {})
 
     def _episode_metrics(self) -> dict[str, Any]:
         shown = self._mask.target_id if self._mask is not None else None

@@ -259,6 +259,8 @@ def test_keep_out_zones_move_the_command_and_leave_nothing_where_they_are_all_ov
     barred = ClearEnv(**CHEAP, keep_out=ALL_OVER)
     with pytest.raises(ConfigurationError, match=r"nothing to dig: .* barred by keep_out.*keep_out='-3,-3,3,3'"):
         barred.reset(options={"scene_id": 1})
+    with pytest.raises(ConfigurationError, match="no episode yet; call reset"):  # not an error of another kind
+        barred.step(np.zeros(4, np.float32))
     barred.close()
 
 
