@@ -282,7 +282,7 @@ def is_stage_list(value):
 
 DEMOS = {
     **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
-    "stages": Rule(is_stage_list, STAGES),
+    "stages": Rule(is_stage_list, STAGES, is_text=True),
 }
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}
