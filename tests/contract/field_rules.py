@@ -271,10 +271,19 @@ SCENES = {
     "target_rule": one_of("round", "uniform", "nearest").beside(targets=1),
     "seed": whole(0, SEED),
 }
-STAGES = ("0", "15", "0,4,8", "8, 0"), ("16", "0,,4", "4,4", "-1", "1.5", "0;4", "²", "9" * 5000)
+STAGES = ("0", "15", "0,4,8", "8, 0", "16", "0,,4", "4,4", "-1", "1.5", "0;4", "²", "9" * 5000)
+
+
+def is_stage_list(value):
+    """Tell whether a value lists stages of the excavator, each once."""
+    words = [word.strip() for word in value.split(",")] if isinstance(value, str) else []
+    known = {str(number) for number in range(16)}
+    return bool(words) and set(words) <= known and len(set(words)) == len(words)
+
+
 DEMOS = {
     **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
-    "stages": Rule(lambda v: isinstance(v, str) and v in (*STAGES[0], "1"), (*STAGES[0], *STAGES[1])),
+    "stages": Rule(is_stage_list, STAGES, is_text=True),
 }
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}

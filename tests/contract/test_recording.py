@@ -61,8 +61,8 @@ def test_the_session_log_describes_each_episode(make_robot, record_episode):
     assert (episode.frames, episode.restarts, episode.schedule, episode.end) == (4, [], (), "ended")
 
 
-def test_the_stage_of_the_robot_reaches_environment_and_log(make_robot, record_episode):
-    last = make_robot().task_spec.last_stage
+def test_the_stage_of_the_robot_reaches_environment_and_log(make_robot, new_robot, record_episode):
+    last = new_robot().task_spec.last_stage
     robot = make_robot(stage=last)
     record_episode(robot, 0)
     robot.send_action({"reinitialise": 1.0})

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lerobot_excav.envs.tasks.task import TaskSpec
-from lerobot_excav.errors import require, require_integer
+from lerobot_excav.errors import require
 
 
 def parse_stages(option: str, text: str, spec: TaskSpec) -> tuple[int, ...]:
@@ -18,8 +18,14 @@ def parse_stages(option: str, text: str, spec: TaskSpec) -> tuple[int, ...]:
         f"{option}={text!r:.100} is not possible; give whole numbers with commas between them, such as 0,4,8",
     )
     stages = sorted(int(word) for word in words)
-    hint = "" if spec.last_stage else f"Scenes of {spec.id} have no stages; leave {option} out."
-    require_integer(option, stages[-1], 0, spec.last_stage, hint=hint)
+    require(
+        stages == [0] or spec.last_stage > 0,
+        f"{option}={text!r:.100} is not possible: scenes of {spec.id} have no stages; leave {option} out",
+    )
+    require(
+        stages[-1] <= spec.last_stage,
+        f"{option}={text!r:.100} is not possible; the last stage of {spec.id} is {spec.last_stage}",
+    )
     require(len(set(stages)) == len(stages), f"{option}={text!r:.100} names a stage twice; name each once")
     return tuple(stages)
 

@@ -3,7 +3,7 @@ from lerobot.datasets import aggregate_pipeline_dataset_features, create_initial
 from lerobot.datasets.feature_utils import features_equal_for_merge
 from lerobot.processor import make_default_processors
 from lerobot.robots import RobotConfig
-from lerobot.utils.feature_utils import combine_feature_dicts
+from lerobot.utils.feature_utils import combine_feature_dicts, dataset_to_policy_features
 
 import lerobot_excav.plugin  # noqa: F401 - registers the robots
 from lerobot_excav.datasets.format.pair import Pair
@@ -86,6 +86,12 @@ def test_a_column_that_is_missing_or_of_another_kind_is_named(spec, key, changes
     features.pop(key, None)
     with pytest.raises(DatasetError, match=message):
         require_columns(spec, features | changed)
+
+
+def test_policies_see_none_of_the_excav_columns(spec):
+    features = dataset_features(spec, height=32, width=48)
+    shown = dataset_to_policy_features(features)
+    assert shown.keys() == features.keys() - excav_features(spec).keys()
 
 
 def test_a_setting_is_a_column_where_its_task_has_it_alone():
