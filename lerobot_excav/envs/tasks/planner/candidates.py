@@ -35,7 +35,7 @@ HEIGHT_GAIN_M2 = 0.001
 """What a place farther away costs, and a higher one gains [m3 per m]: these decide where the soil is the same."""
 
 ONSET_M3 = 0.017
-LONGEST_ONSET_M = 0.3
+LONGEST_ONSET_M = 0.35
 """Loading has to begin inside the region: 25 kg of sand within this length of the cut [m3, m]."""
 LEAST_SWEPT_M3 = 0.03
 """Less soil along the cut is not worth a cycle [m3]; 44 kg of sand (kind: guess)."""

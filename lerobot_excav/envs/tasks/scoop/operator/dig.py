@@ -14,7 +14,7 @@ from lerobot_excav.envs.tasks.scoop.operator.section import Section
 from lerobot_excav.envs.tasks.scoop.operator.variation import Variation
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
-THIN_SOIL_M = 0.3
+THIN_SOIL_M = 0.2
 """Mean height of the soil below which it is scraped [m] (kind: tuned on train scenes): the edge of a cut rises over the
 last half metre of soil as thin as this, while the bucket is rolled in."""
 LOOK_LENGTH_M = 1.5

@@ -20,7 +20,7 @@ TRACKING_TIME_S = 0.3
 ARRIVAL_TOLERANCE_RAD = 0.04
 OVERTIME_S = 0.8
 """How long to wait for the machine after a motion should have ended [s], for instance when the bucket stalls."""
-FULL_KG = 500.0
+FULL_KG = 470.0
 """Payload at which the cut is broken off [kg]."""
 
 

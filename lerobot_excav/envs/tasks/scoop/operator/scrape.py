@@ -18,7 +18,7 @@ FLOOR_M = 0.02
 """Height of the edge at which it counts as down [m]: that of the level plate on the floor."""
 VOLUME_M3 = 0.40
 """Soil to sweep at the most [m3]: along the floor a bucket loads less than in a cut, and pushes the rest ahead."""
-ROLL_LENGTH_M = 0.3
+ROLL_LENGTH_M = 0.1
 """Way of the edge while the bucket is rolled in [m]."""
 _SMOOTHING = 5
 """Twice over so many points is the path smoothed."""
