@@ -12,7 +12,7 @@ from lerobot_excav.envs.tasks.scoop.operator.shell import flattest_pitch_rad, ha
 from lerobot_excav.envs.tasks.scoop.operator.variation import Variation
 
 # Numbers of the scrape (kind: tuned on train scenes).
-FLOOR_CLEARANCE_M = 0.002
+FLOOR_CLEARANCE_M = 0.003
 """Height of the lowest point of the shell over the rigid floor [m]; the edge is a plate's thickness higher."""
 FLOOR_M = 0.02
 """Height of the edge at which it counts as down [m]: that of the level plate on the floor."""
