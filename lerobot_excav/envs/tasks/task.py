@@ -54,7 +54,8 @@ class TaskSpec:
         settings: What a user may set; its `ENV_TYPE` is the `--env.type`.
         simulation_version: Version of the simulation. Recorded actions lead to the recorded states again in the version
             that made them only. It counts changes of soil, machine, scenes or targets after which a replay deviates or
-            a scene's number means another scene; speed, pictures and policies are not part of it.
+            a scene's number means another scene, and changes of operator or planner where starts have stages; speed,
+            pictures and policies are not part of it.
         changes: What each version is, or changed.
         env_entry: Class of the environment, a `MaskedTaskEnv`.
         operator_entry: Class of the scripted operator, an `Operator` made with `rng`.
