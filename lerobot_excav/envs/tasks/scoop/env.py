@@ -143,7 +143,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         return self.scene.targets[target_id]
 
     def _begin_command(self, target_id: int) -> None:
-        require(target_id < self._target_count, f"commands: there is no target {target_id} at this stage of the scene")
+        require(target_id < self._target_count, f"commands: this stage of the scene offers no target {target_id}")
         self.cycle.retarget(target_id)
 
     @property
