@@ -24,14 +24,18 @@ def main() -> int:
     parser.add_argument("--fps", type=int, default=10, help="pictures per second of the time lapse (default: 10)")
     parser.add_argument("--width", type=int, help="width of a .webp [px] (default: as it is)")
     given = parser.parse_args()
-    if given.every < 1 or given.fps < 1:
-        parser.error("--every and --fps: allowed are 1 and above")
-    pictures = islice(read_video(given.video), 0, None, given.every)
+    if min(given.every, given.fps, given.width or 1) < 1:
+        parser.error("--every, --fps and --width: allowed are 1 and above")
+    if given.out.suffix not in (".mp4", ".webp"):
+        parser.error(f"out={given.out}: allowed are .mp4 and .webp")
+    if given.width and given.out.suffix == ".mp4":
+        parser.error("--width is of use with .webp only")
+    pictures = list(islice(read_video(given.video), 0, None, given.every))
+    if not pictures:
+        parser.error(f"{given.video} holds no pictures")
     if given.out.suffix == ".mp4":
         write_video(given.out, pictures, given.fps, crf=20)
         return 0
-    if given.out.suffix != ".webp":
-        parser.error(f"out={given.out}: allowed are .mp4 and .webp")
     images = [Image.fromarray(picture) for picture in pictures]
     if given.width:
         height = round(images[0].height * given.width / images[0].width)

@@ -22,7 +22,7 @@ class Evaluation:
         task: Its task.
         measures: What is measured of the task.
         of: How many evaluations the file holds; LeRobot appends one after the other, and this is the last.
-        operator: Who played, if the file says so: `scripted`, `human`, or None for a policy.
+        operator: Who played, if the file says so: `scripted`, `person`, or None for a policy.
         seed: Seed of the first episode; LeRobot's `--seed`. None if the file does not say.
         episodes: Outcomes by scene, stage and target.
     """

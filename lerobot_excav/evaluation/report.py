@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from pkgutil import resolve_name
@@ -14,6 +15,9 @@ from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, measured
 from lerobot_excav.whole_file import write_whole
+
+FIGURE = "figure_"
+"""What the names of figures begin with."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,22 +79,35 @@ def file_notes(run: Run) -> list[str]:
     ]
 
 
-def write_report(report: Report, markdown: str, folder: Path) -> None:
-    """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made.
+def write_report(report: Report, markdown: str, folder: Path) -> list[Path]:
+    """Write a report as `report.json`, and its text as `report.md`, into a folder, which is made; return what it wrote.
 
-    Where the task has a figure, one is drawn for every run, `figure_LABEL.png`.
+    Where the task has a figure, one is drawn for every run, and shown at the end of the text. Figures of an earlier
+    report are removed.
 
     Raises:
         DatasetError: A file of that name was not written by a report, or was changed since.
     """
-    with ReportFolder(folder).staged() as stage:
-        write_whole(stage / "report.md", markdown)
+    figures = figure_names([row.run for row in report.runs])
+    shown = "".join(f"\n![{run.label}]({name})\n" for name, run in figures.items())
+    destination = ReportFolder(folder)
+    with destination.staged() as stage:
+        write_whole(stage / "report.md", markdown + shown)
         write_whole(stage / "report.json", json.dumps(report.as_dict(), indent=1) + "\n")
-        for run in (row.run for row in report.runs):
-            if run.measures.figure_entry is not None:
-                resolve_name(run.measures.figure_entry)(run.episodes, stage / figure_name(run.label))
+        for name, run in figures.items():
+            resolve_name(run.measures.figure_entry or "")(run.episodes, stage / name)
+    destination.remove(lambda name: name.startswith(FIGURE) and name not in figures)
+    return [folder / name for name in ("report.md", "report.json", *figures)]
 
 
-def figure_name(label: str) -> str:
-    """Return the name of the figure of a run, whose label may hold what is not for file names."""
-    return f"figure_{re.sub(r'[^A-Za-z0-9_.-]+', '_', label)}.png"
+def figure_names(runs: Sequence[Run]) -> dict[str, Run]:
+    """Return the runs that have a figure, by the name of its file; labels may hold what is not for file names."""
+    figures: dict[str, Run] = {}
+    for run in (run for run in runs if run.measures.figure_entry is not None):
+        stem = name = f"{FIGURE}{re.sub(r'[^A-Za-z0-9_.-]+', '_', run.label)}"
+        number = 1
+        while f"{name}.png" in figures:
+            number += 1
+            name = f"{stem}_{number}"
+        figures[f"{name}.png"] = run
+    return figures

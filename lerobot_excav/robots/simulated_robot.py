@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_settings
+from lerobot_excav.envs.tasks.selection import TargetAbsentError
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
@@ -237,13 +238,22 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._log.note_operator(operator)
 
     def start_scene(self) -> None:
-        """Reset the environment to the current scene and target."""
-        self._observation, info = self.env.reset(options=dict(self.start))
+        """Reset the environment to the current scene and target, or the next one that its start offers."""
+        self._observation, info = self._reset()
         self._held_frames = info["mask_missing_frames"]
         self._is_homing = False
         self._require_mask(info)
         self.episode_count += 1
         logger.info("Scene %d, target %d of set %s", self.scene_id, self.target_id, self.settings.scene_set)
+
+    def _reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        for _ in range(self.task_spec.target_count - 1):
+            try:
+                return self.env.reset(options=dict(self.start))  # type: ignore[no-any-return]
+            except TargetAbsentError as absent:  # late stages of a scene have fewer regions
+                logger.warning("%s; the next one is shown", absent)
+                self._order.skip()
+        return self.env.reset(options=dict(self.start))  # type: ignore[no-any-return]
 
     def _begin_episode(self, episode_index: int) -> None:
         self._order.begin(episode_index)
@@ -264,8 +274,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         state, wanted = None, None
         if all(name in action for name in names):  # else LeRobot has no frame to record
             state, wanted = self._state, command_from_action(action, names).tolist()
-        self._log.note_restart(state, wanted, **self.start)
         self.start_scene()
+        self._log.note_restart(state, wanted, **self.start)
 
     def _end_episode(self) -> None:
         self._order.end()
@@ -279,7 +289,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         config, count = self.config, self.task_spec.starts_per_scene
         first = config.scene_id * count + config.target_id
         by_episode = config.advance == "episode"
-        return TargetOrder(first, by_episode=by_episode, per_scene=count, log_path=self._log.path)
+        return TargetOrder(first, by_episode=by_episode, per_scene=count, stage=config.stage, log_path=self._log.path)
 
     def _drives_home(self, action: Mapping[str, Any]) -> bool:
         """Tell whether an action holds positions only, and the machine takes none."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lerobot_excav.errors import ConfigurationError
 
-Start = tuple[int, int]
-"""Scene and first target of an episode."""
+LoggedStart = tuple[int, int, int]
+"""Scene, stage and first target of an episode."""
 
 
 class TargetOrder:
@@ -22,11 +22,13 @@ class TargetOrder:
         first: Number of the first target.
         by_episode: Whether every episode gets a target of its own.
         per_scene: Targets of a scene.
+        stage: Stage at which every scene is shown.
         log_path: Session log, which tells what a recording that is resumed has shown so far.
     """
 
-    def __init__(self, first: int, *, by_episode: bool, per_scene: int, log_path: Path) -> None:
+    def __init__(self, first: int, *, by_episode: bool, per_scene: int, stage: int, log_path: Path) -> None:
         self._first, self._by_episode, self._per_scene, self._log_path = first, by_episode, per_scene, log_path
+        self._stage = stage
         self._is_new = True  # whether no episode of this session has begun
         self._left_out = 0
         self._is_running = False  # whether an episode is
@@ -34,7 +36,7 @@ class TargetOrder:
         self.number = first
 
     @property
-    def start(self) -> Start:
+    def start(self) -> tuple[int, int]:
         """Scene and target."""
         return divmod(self.number, self._per_scene)
 
@@ -45,6 +47,11 @@ class TargetOrder:
             self._pressed += 1
         else:
             self._left_out += 1
+
+    def skip(self) -> None:
+        """Leave out the present target for good: its start does not offer it."""
+        self.number += 1
+        self._left_out += 1
 
     def begin(self, episode_index: int) -> None:
         """Begin an episode, counted from 0 in the dataset.
@@ -69,7 +76,7 @@ class TargetOrder:
         self.number -= self._pressed
         self._pressed = 0
 
-    def _resume(self, episode_index: int, logged: Mapping[int, Start]) -> None:
+    def _resume(self, episode_index: int, logged: Mapping[int, LoggedStart]) -> None:
         missing = [index for index in range(episode_index) if index not in logged]
         if missing:
             lacking = "all of them" if len(missing) == episode_index else f"episodes {missing}"
@@ -79,13 +86,15 @@ class TargetOrder:
                 "of the first session as --robot.session_log=FILE (by default it is in outputs/<robot>_sessions), or "
                 "record into a new dataset and merge both once they are indexed."
             )
-        scene_id, target_id = logged[0]
-        if divmod(self._first, self._per_scene) != (scene_id, target_id):
+        scene_id, stage, target_id = logged[0]
+        if (*divmod(self._first, self._per_scene), self._stage) != (scene_id, target_id, stage):
+            at = f", stage {stage}" if stage or self._stage else ""
+            again = f"--robot.scene_id={scene_id} --robot.target_id={target_id}"
             raise ConfigurationError(
-                f"the recording that is resumed began with scene {scene_id} and target {target_id}. Give "
-                f"--robot.scene_id={scene_id} --robot.target_id={target_id} again, or record into a new dataset."
+                f"the recording that is resumed began with scene {scene_id}{at} and target {target_id}. Give {again}"
+                f"{f' --robot.stage={stage}' if at else ''} again, or record into a new dataset."
             )
-        scene_id, target_id = logged[episode_index - 1]
+        scene_id, _, target_id = logged[episode_index - 1]
         last = scene_id * self._per_scene + target_id
         if self._by_episode:
             self._left_out = last + 1 - self._first - episode_index
@@ -93,9 +102,9 @@ class TargetOrder:
             self.number = last
 
 
-def logged_starts(path: Path) -> dict[int, Start]:
-    """Return scene and first target of the episodes in a session log, by number; an unreadable line counts as none."""
-    starts: dict[int, Start] = {}
+def logged_starts(path: Path) -> dict[int, LoggedStart]:
+    """Return scene, stage and first target of a session log's episodes, by number; unreadable lines count as none."""
+    starts: dict[int, LoggedStart] = {}
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
@@ -104,8 +113,9 @@ def logged_starts(path: Path) -> dict[int, Start]:
         try:
             episode = json.loads(line)
             if episode["event"] == "episode":
-                index, *start = (operator.index(episode[key]) for key in ("episode_index", "scene_id", "target_id"))
-                starts[index] = start[0], start[1]
+                keys = ("episode_index", "scene_id", "stage", "target_id")
+                index, scene_id, stage, target_id = (operator.index(episode[key]) for key in keys)
+                starts[index] = scene_id, stage, target_id
         except (ValueError, TypeError, LookupError):
             continue  # `lerobot-excav index` says what is wrong with it
     return starts

@@ -155,7 +155,7 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     lines = [
         "simulation: " + "; ".join(f"version {v}, {len(e)} episodes" for v, e in versions.items()),
         *(_counts(name, index[name]) for name in start_settings(index)),
-        f"{_starts(index, coverage)}, of which {coverage.complete_starts} with all {coverage.targets} targets",
+        f"{_starts(index, coverage)}, of which {coverage.complete_starts} with all {_all_targets(index, coverage)}",
         f"successes: {int(index['success'].sum())} of {len(index)}; quality check: {verdicts}",
         *(task_spec("excav.task", str(task)).measures.summary(rows) for task, rows in index.groupby("task")),
     ]
@@ -165,6 +165,11 @@ def describe(index: pd.DataFrame, coverage: PairCoverage) -> list[str]:
     lines += [f"missing: {start} lacks target {targets}" for start, targets in coverage.missing.items()]
     lines += [f"duplicate: {uid} in episodes {episodes}" for uid, episodes in coverage.duplicates.items()]
     return lines
+
+
+def _all_targets(index: pd.DataFrame, coverage: PairCoverage) -> str:
+    """Say what a complete start has: how many regions a later stage offers is known by those shown only."""
+    return f"{coverage.targets} targets" if set(index["stage"]) == {0} else "targets that are known of them"
 
 
 def _starts(index: pd.DataFrame, coverage: PairCoverage) -> str:

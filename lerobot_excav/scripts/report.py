@@ -43,7 +43,7 @@ class ReportArguments(Arguments):
     metrics_folder: Path | None = setting("With --rows: folder of the metrics in place of the file's", default=None)
     operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
     out: Path | None = setting(
-        "Folder for report.md and report.json; replaces nothing but earlier reports", default=None
+        "Folder for report.md, report.json and figures; replaces nothing but earlier reports", default=None
     )
     seed: int = setting("Seed of the bootstrap", default=0, low=0)
 
@@ -68,8 +68,8 @@ def run(arguments: ReportArguments) -> int:
     text = report_text(report)
     print(text)
     if arguments.out is not None:
-        write_report(report, text, arguments.out)
-        print(f"written: {arguments.out / 'report.md'}, {arguments.out / 'report.json'}")
+        written = write_report(report, text, arguments.out)
+        print(f"written: {', '.join(map(str, written))}")
     return 0
 
 

@@ -54,6 +54,14 @@ def test_another_target_changes_what_is_said_of_the_target_alone(task):
     env.close()
 
 
+@pytest.mark.parametrize(
+    "setting", [{"mask_condition": "zero"}, {"mask_noise": "shift", "mask_noise_px": 2}, {"target_overlay": True}]
+)
+def test_a_mask_that_nobody_sees_cannot_be_corrupted(setting):
+    with pytest.raises(ConfigurationError, match=rf"{next(iter(setting))}=.* has no effect with obs_type='state'"):
+        made("Scoop-v0", **setting)
+
+
 def test_a_task_that_names_no_elements_refuses_it():
     spec = next(spec for spec in TASKS.values() if not spec.environment_state_names)
     with pytest.raises(ConfigurationError, match=r"obs_type='state'.*'pixels_agent_pos', 'agent_pos'"):

@@ -72,6 +72,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         shown = {name: settings.pop(name) for name in declared_settings(RenderSettings) if name in settings}
         self.settings, self.render_settings = spec.make_settings(**settings), RenderSettings(**shown)
         require_choice("obs_type", obs_type, spec.obs_types)
+        self.settings.require_mask_effect(obs_type)
         require_choice("render_mode", render_mode, RENDER_MODES)
         require_choice("render_camera", self.render_settings.render_camera, spec.views)
         self.task, self.task_description = spec.id, spec.description
@@ -232,6 +233,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             ConfigurationError: An option is unknown or has a value that is not possible.
         """
         super().reset(seed=seed)
+        self._selection = self._picture = None  # until the start has succeeded
         rng, length = self.np_random, self.episode_length
         selection = self._selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
         try:
@@ -240,7 +242,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             self._selection = None  # so that a step says that there is no episode
             raise
         self._frame = self._missing_frames = 0
-        self._commands, self._main_img, self._picture, self._is_over = [], None, None, False
+        self._commands, self._main_img, self._is_over = [], None, False
         self._give_command(selection.target_id)
         self._wait_for_mask()
         return self._observe(), self._info(is_over=False)
@@ -283,7 +285,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     @property
     def scene_key(self) -> tuple[int, ...]:
         """Numbers of the scene set and of the scene, and of what a task tells apart within it."""
-        return SCENE_SETS.index(self.settings.scene_set), self.scene_id
+        return SCENE_SETS.index(self.settings.scene_set), self.scene_id, *((self.stage,) if self.stage else ())
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the main picture, (H, W, 3) uint8; drawn once per frame, for mask sources ask for it again."""

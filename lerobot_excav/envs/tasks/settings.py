@@ -132,6 +132,21 @@ class TaskSettings:
         words = (self.mask_source, *self._mask_errors, *(("as overlay",) if self.target_overlay else ()))
         return ", ".join(words)
 
+    def require_mask_effect(self, obs_type: str) -> None:
+        """Refuse settings of the mask where the target is told as numbers, exactly.
+
+        Raises:
+            ConfigurationError: `obs_type` is `state`, and one is not its default.
+        """
+        names = ("mask_source", "mask_condition", "mask_noise", "target_overlay") if obs_type == "state" else ()
+        for name in names:
+            value, usual = getattr(self, name), getattr(TaskSettings, name)
+            require(
+                value == usual,
+                f"{self.PREFIX}{name}={value!r} has no effect with obs_type='state', which tells the target as "
+                "numbers; leave it out, or take obs_type='pixels_agent_pos'",
+            )
+
     @property
     def mask_faults(self) -> tuple[str, ...]:
         """What is wrong with the mask on purpose, in words."""

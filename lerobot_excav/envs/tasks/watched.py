@@ -25,7 +25,7 @@ class WatchedEnv(ABC):
     _is_over = False
     _view: View | None = None
     _picture: NDArray[np.uint8] | None = None
-    _picture_frame = 0
+    _drawn = (False, 0)  # whether the episode was over when the picture was drawn, and its frame
 
     @abstractmethod
     def _make_view(self, height: int, width: int) -> View:
@@ -80,9 +80,10 @@ class WatchedEnv(ABC):
         """
         if self.render_mode is None:
             return None
-        frame, every = round(self.time_s * self.settings.fps), self.render_settings.render_every
-        if self._picture is None or self._is_over or every == 1 or frame - self._picture_frame >= every:
-            self._picture, self._picture_frame = self._draw_for_people(), frame
+        every, drawn = self.render_settings.render_every, (self._is_over, round(self.time_s * self.settings.fps))
+        is_end = self._is_over and drawn != self._drawn
+        if self._picture is None or is_end or every == 1 or drawn[1] - self._drawn[1] >= every:
+            self._picture, self._drawn = self._draw_for_people(), drawn
         return self._picture.copy()
 
     def _draw_for_people(self) -> NDArray[np.uint8]:

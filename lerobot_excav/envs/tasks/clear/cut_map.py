@@ -8,8 +8,10 @@ import numpy as np
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_from_world
+from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord
 from lerobot_excav.envs.tasks.scoop.scene import cell_centres_w, draw_scene
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
 MOST_PILES = 4
@@ -23,16 +25,20 @@ def draw_cut_map(piles: Sequence[ClearRecord], path: Path) -> None:
     """Draw the cycles of up to `MOST_PILES` episodes, seen from above, as a picture file."""
     from matplotlib.figure import Figure
 
+    of = f" ({MOST_PILES} of {len(piles)} piles)" if len(piles) > MOST_PILES else ""
     piles = piles[:MOST_PILES]
     figure = Figure(figsize=(_PANEL_IN[0] * len(piles), _PANEL_IN[1]), dpi=110, layout="constrained")
     for axes, pile in zip(np.atleast_1d(figure.subplots(1, len(piles))), piles, strict=True):
         _draw_pile(axes, pile)
-    figure.suptitle("Squares: commanded regions, green where digging began inside; dots: where it began", fontsize=9)
+    key = "Squares: commanded regions, green where digging began inside; dots: where it began"
+    figure.suptitle(key + of, fontsize=9)
     figure.savefig(path, metadata={"Software": None})
 
 
 def _draw_pile(axes: Any, pile: ClearRecord) -> None:
-    _draw_ground(axes, pile)
+    if _pile_is_known(pile):
+        _draw_pile_heights(axes, pile)
+    _draw_site(axes)
     for number, cycle in enumerate(pile.cycles, start=1):
         centre_w = np.asarray(cycle.region_w)
         colour = "tab:green" if cycle.target_success else "tab:red"
@@ -44,14 +50,23 @@ def _draw_pile(axes: Any, pile: ClearRecord) -> None:
             axes.plot(*ends.T, color=colour, linewidth=0.9)
             axes.plot(*ends[0], marker="o", markersize=3.5, color=colour)
     removed = f"{100.0 * pile.pile_removed:.0f} % removed in {pile.cycle_count} cycles"
-    axes.set_title(f"{pile.scene_set} scene {pile.scene_id}: {removed}", fontsize=9)
+    stage = f", stage {pile.stage}" if pile.stage else ""
+    axes.set_title(f"{pile.scene_set} scene {pile.scene_id}{stage}: {removed}", fontsize=9)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(-5.5, 3.2), ylim=(-3.2, 6.2))
 
 
-def _draw_ground(axes: Any, pile: ClearRecord) -> None:
-    """Draw the pile as it was at first, the machine and the box."""
+def _pile_is_known(pile: ClearRecord) -> bool:
+    """Tell whether the pile as it was at first can be drawn: not after digging, of older scenes, or of other soils."""
+    return pile.stage == 0 and pile.simulation_version == SCOOP.simulation_version and pile.soil in PRESETS
+
+
+def _draw_pile_heights(axes: Any, pile: ClearRecord) -> None:
     scene = draw_scene(pile.scene_set, pile.scene_id, soil=pile.soil)
     axes.contourf(*cell_centres_w(), scene.heights_m.T, levels=[*_LEVELS_M, 2.0], cmap="YlOrBr", alpha=0.35)
+
+
+def _draw_site(axes: Any) -> None:
+    """Draw the machine and the box."""
     box = TARGET_BOX.center_w[:2] + TARGET_BOX.half_extent_m * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     axes.fill(*box.T, facecolor="none", edgecolor="tab:blue", linewidth=1.5)
     axes.text(*TARGET_BOX.center_w[:2], "box", ha="center", va="center", color="tab:blue", fontsize=9)

@@ -78,9 +78,9 @@ class ClearEnv(ExcavatorEnv):
         self._clearing = Clearing(self.worksite)
         self._look()
         if self.plan.nothing_left is not None:
-            raise (TargetAbsentError if self.stage else ConfigurationError)(
+            raise (TargetAbsentError if self.stage and not settings.zones else ConfigurationError)(
                 f"scene_id={scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another scene, or other "
-                f"zones than keep_out={self._excavator_settings.keep_out!r}"
+                f"zones than keep_out={settings.keep_out!r}"
             )
         self._begin_cycle(target_id)
 

@@ -156,11 +156,12 @@ def clear_sentence(piles: Sequence[ClearRecord]) -> str:
     what = f"{removed:.0f} % of the pile was removed in {number}"
     if count != 1:
         what = f"Of {count} piles {removed:.0f} % was removed on average, in {number} each"
+    masks = {pile.mask for pile in piles}
     contacts = sum(pile.hard_target_contacts for pile in piles)
     hit_hard = {0: "never hit hard", 1: "hit hard once"}.get(contacts, f"hit hard {contacts} times")
     return (
-        f"{what}; in {hits} of {len(cycles)} cycles digging began inside the region that the mask showed; the box was "
-        f"{hit_hard}."
+        f"{what}; in {hits} of {len(cycles)} cycles digging began inside the commanded region; the box was {hit_hard}."
+        f"{'' if masks == {'correct'} else f' The mask: {"; ".join(sorted(masks))}.'}"
     )
 
 

@@ -94,9 +94,10 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
     radius, swing = np.hypot(*offset.T), np.arctan2(offset[:, 1], offset[:, 0])
     gone = np.arange(0.0, CUT_LENGTH_M, _STEP_M)
     radii = radius[:, None] + ENTRY_AHEAD_M - gone
-    surface_m, seen_share = _along_the_cut(surface, radii, swing)
+    surface_m, seen = _along_the_cut(surface, radii, swing)
     floor_m = np.maximum(surface_m - CUT_DEPTH_M * np.minimum(gone / ENTRY_LENGTH_M, 1.0), FLOOR_CLEARANCE_M)
-    cut_m = np.where(radii >= end_radius_m(radii[:, :1]), np.maximum(surface_m - floor_m, 0.0), 0.0)
+    is_cut = radii >= end_radius_m(radii[:, :1])
+    cut_m = np.where(is_cut, np.maximum(surface_m - floor_m, 0.0), 0.0)
     swept_m3 = np.cumsum(cut_m, axis=1) * _STEP_M * BUCKET_INNER_WIDTH_M
     total_m3 = np.minimum(swept_m3[:, -1], FULL_BUCKET_M3)
     begun = swept_m3 >= ONSET_M3
@@ -107,7 +108,7 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
         radius_m=radius,
         swept_m3=swept_m3[:, -1],
         onset_m=onset_m,
-        seen_share=seen_share,
+        seen_share=(seen * is_cut).sum(axis=1) / np.maximum(is_cut.sum(axis=1), 1),
         is_barred=is_barred(centers_w, keep_out, inner_radius_m=KEEP_OUT_RADIUS_M, half_size_m=0.5 * PATCH_SIZE_M),
         score=total_m3 - LENGTH_COST_M2 * filled_m - RADIUS_COST_M2 * radius + HEIGHT_GAIN_M2 * centers_w[:, 2],
     )
@@ -116,7 +117,7 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
 def _along_the_cut(
     surface: SeenSurface, radii: NDArray[np.float64], swing: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean height over the bucket's width along cuts (n, steps) [m], and the seen part of each (n,)."""
+    """Return the mean height over the bucket's width along cuts [m], and what part of it is seen; each (n, steps)."""
     heights, seen = np.zeros_like(radii), np.zeros_like(radii)
     for lane in _LANES:
         aside = lane * BUCKET_INNER_WIDTH_M / np.maximum(radii, 1.0)
@@ -124,4 +125,4 @@ def _along_the_cut(
         cells, inside = surface.cells_at(points_w), surface.covers(points_w)
         heights += np.where(inside, surface.heights_m[cells], 0.0) / len(_LANES)
         seen += (surface.is_seen[cells] | ~inside) / len(_LANES)
-    return heights, seen.mean(axis=1)
+    return heights, seen

@@ -46,4 +46,5 @@ def _zone(place: str, part: str) -> Zone:
 
 def zone_text(zones: Sequence[Zone]) -> str:
     """Write zones as a setting, in the one spelling that files compare."""
-    return "; ".join(",".join(f"{edge:.10g}" for edge in zone) for zone in zones) or NO_ZONES
+    texts = (",".join(f"{edge + 0.0:.10g}" for edge in zone) for zone in zones)  # + 0.0: no -0
+    return "; ".join(sorted(set(texts))) or NO_ZONES

@@ -35,14 +35,37 @@ def test_the_sentence_says_how_much_how_often_and_whether_the_box_was_hit():
     cycles = tuple(cycle.model_copy(update={"target_success": n > 0}) for n, cycle in enumerate(pile.cycles[:4]))
     told = pile.model_copy(update={"pile_removed": 0.305, "cycles": cycles, "hard_target_contacts": 1})
     assert clear_sentence([told]) == (
-        "30 % of the pile was removed in 4 cycles; in 3 of 4 cycles digging began inside the region that the mask "
-        "showed; the box was hit hard once."
+        "30 % of the pile was removed in 4 cycles; in 3 of 4 cycles digging began inside the commanded region; the box "
+        "was hit hard once."
     )
     assert clear_sentence([told, pile]).startswith("Of 2 piles ")
     assert clear_sentence([pile]).endswith("the box was never hit hard.")
+    wrong = pile.model_copy(update={"mask_condition": "zero"})
+    assert clear_sentence([wrong]).endswith("the box was never hit hard. The mask: zero.")
 
 
 def test_a_report_of_piles_says_the_sentence_and_draws_the_map(tmp_path, capsys):
     assert main(["report", f"a b={METRICS}", f"--out={tmp_path}"]) == 0
     assert "Of 6 piles 71 % was removed on average" in capsys.readouterr().out
     assert Image.open(tmp_path / "figure_a_b.png").width > 1000
+    assert "![a b](figure_a_b.png)" in (tmp_path / "report.md").read_text()
+
+
+def test_figures_of_one_name_are_kept_apart_and_old_ones_go(tmp_path):
+    other = tmp_path / "other.jsonl"
+    other.write_text(METRICS.read_text())
+    out = tmp_path / "report"
+    assert main(["report", f"a b={METRICS}", f"a/b={other}", f"--out={out}"]) == 0
+    assert {path.name for path in out.glob("*.png")} == {"figure_a_b.png", "figure_a_b_2.png"}
+    assert main(["report", f"c={METRICS}", f"--out={out}"]) == 0
+    assert {path.name for path in out.glob("*.png")} == {"figure_c.png"}
+
+
+def test_piles_of_a_soil_of_ones_own_or_of_an_older_simulation_are_drawn_without_their_heights(tmp_path):
+    pile = piles(1)[0]
+    pictures = []
+    for changes in ({}, {"soil": "custom"}, {"simulation_version": 1}, {"stage": 2}):
+        draw_cut_map([pile.model_copy(update=changes)], tmp_path / "map.png")
+        pictures.append((tmp_path / "map.png").read_bytes())
+    assert pictures[1] == pictures[2] != pictures[0]
+    assert pictures[3] != pictures[2]  # the title names the stage

@@ -5,7 +5,7 @@ from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.errors import ConfigurationError
 
 
-@pytest.mark.parametrize("text", ["0,0,1,1;2,2,3,3.5", " 0.0, 0,1.00,1 ; 2,2,3,3.5", "0,0,1,1; 2,2,3,3.5"])
+@pytest.mark.parametrize("text", ["0,0,1,1;2,2,3,3.5", " 0.0, 0,1.00,1 ; 2,2,3,3.5", "2,2,3,3.5; 0,0,1,1; -0,0,1,1"])
 def test_zones_have_one_spelling_in_files(text):
     assert ExcavatorSettings(task="Clear-v0", keep_out=text).keep_out == "0,0,1,1; 2,2,3,3.5"
 
