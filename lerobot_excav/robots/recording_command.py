@@ -55,6 +55,13 @@ def require_fitting_command(robot_config: Any) -> Any | None:
     return command
 
 
+def operator_of(command: Any) -> str | None:
+    """Return who commands by a command of LeRobot, `policy` or `person`; a scripted operator says so itself."""
+    if hasattr(command, "strategy"):  # lerobot-rollout
+        return "policy"
+    return "person" if getattr(command, "teleop", None) is not None else None
+
+
 def recorded_text(command: Any) -> str | None:
     """Return the task text that the command gives every frame that it records, or None if it records nothing."""
     return getattr(recorded_dataset(command), "single_task", None)

@@ -105,7 +105,7 @@ class SessionLog:
         self._write({"event": "episode", "episode_index": episode_index, **start})
 
     def note_operator(self, operator: str) -> None:
-        """Note who drives, `scripted`, in the running episode; once, however often it is told."""
+        """Note who drives, `scripted`, `person` or `policy`, in the running episode; once, however often it is told."""
         if self._is_running and operator != self._operator:
             self._operator = operator
             self._write({"event": "operator", "operator": operator})

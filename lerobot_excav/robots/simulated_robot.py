@@ -27,7 +27,7 @@ from lerobot_excav.envs.tasks.selection import TargetAbsentError
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
-from lerobot_excav.robots.recording_command import recorded_text, require_fitting_command
+from lerobot_excav.robots.recording_command import operator_of, recorded_text, require_fitting_command
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import SessionLog, default_path
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_pressed
@@ -54,6 +54,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
 
     def __init__(self, config: SimulatedRobotConfig) -> None:
         command = require_fitting_command(config)
+        self._operator = operator_of(command)
         super().__init__(config)
         self.config: Any = config
         self.task_spec = spec = config.task_spec
@@ -234,7 +235,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         return self.env.depth_m()
 
     def note_operator(self, operator: str) -> None:
-        """Take note of who drives, `scripted`, for the session log; a person does otherwise, or a policy."""
+        """Take note of who drives, `scripted`, for the session log; otherwise it is who the command says."""
         self._log.note_operator(operator)
 
     def start_scene(self) -> None:
@@ -259,6 +260,8 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._order.begin(episode_index)
         self.start_scene()
         self._log.begin(episode_index, **self.start)
+        if self._operator is not None:
+            self._log.note_operator(self._operator)
         if self._held_frames:
             self._log.note_held()
 

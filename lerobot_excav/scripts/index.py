@@ -9,7 +9,7 @@ Examples:
   lerobot-excav index outputs/recorded --session=outputs/excavator_sim_sessions/2026-01-31_10-00-00.jsonl
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
   lerobot-excav index outputs/rolled_out --session=outputs/session.jsonl --operator=policy
-      the same for what lerobot-rollout recorded: a policy commanded
+      the same where the log does not say that a policy commanded, as a program of one's own may
   lerobot-excav index outputs/recorded --session=outputs/session.jsonl --recover
       after a crash of lerobot-record: play every finished episode again, and write a dataset that can be read
   lerobot-excav index outputs/paired --split=scene --eval_fraction=0.2
@@ -45,8 +45,7 @@ class IndexArguments(DatasetArguments):
     out: Path | None = setting("With a session: put the completed dataset here, and keep the recording", default=None)
     skip_restarted: bool = setting("With a session: leave out episodes in which the scene was restarted", default=False)
     operator: str | None = setting(
-        "With a session: who commanded; left out: the scripted operator where the log says so, else a person. Say "
-        "policy for what lerobot-rollout has recorded",
+        "With a session: who commanded the episodes of which the log does not say it; left out: a person",
         default=None,
         choices=OPERATORS,
     )

@@ -14,7 +14,7 @@ from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_teleoperate
 from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
-from lerobot_excav.robots.recording_command import LOSSLESS_FLAGS, require_fitting_command
+from lerobot_excav.robots.recording_command import LOSSLESS_FLAGS, operator_of, require_fitting_command
 
 FITTING = ["--dataset.fps=10", "--dataset.video=false"]
 RECORD = ["--robot.type=excavator_sim", "--dataset.repo_id=someone/data", "--dataset.single_task=go"]
@@ -138,3 +138,17 @@ def test_python_code_without_a_command_is_free():
     holder = SimpleNamespace(robot=config, fps=30)
     assert holder_of(config, "robot") is None
     require_fitting_command(holder.robot)
+
+
+@pytest.mark.parametrize(
+    ("command", "operator"),
+    [
+        (SimpleNamespace(strategy=SimpleNamespace(type="episodic"), teleop=None), "policy"),
+        (SimpleNamespace(strategy=SimpleNamespace(type="base"), teleop="joystick"), "policy"),
+        (SimpleNamespace(teleop="joystick"), "person"),
+        (SimpleNamespace(teleop=None), None),
+        (None, None),
+    ],
+)
+def test_a_rollout_is_a_policys_and_a_recording_with_a_teleoperator_a_persons(command, operator):
+    assert operator_of(command) == operator

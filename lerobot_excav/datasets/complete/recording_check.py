@@ -90,11 +90,12 @@ def require_operator(session: dict[int, SessionEpisode], operator: str) -> None:
     Raises:
         DatasetError: It does.
     """
-    others = [index for index, episode in session.items() if episode.operator not in (None, operator)]
-    if others:
+    named = {index: episode.operator for index, episode in session.items() if episode.operator not in (None, operator)}
+    if named:
+        others = "; ".join(f"episode {index}: {name}" for index, name in named.items())
         raise DatasetError(
-            f"--operator={operator}, but the session says that the scripted operator commanded episodes {others}; "
-            "leave the option out"
+            f"--operator={operator}, but the session says who commanded ({others}); leave the option out: it is for "
+            "episodes of which the session says nothing"
         )
 
 

@@ -65,7 +65,7 @@ class SessionEpisode:
         runs: What was done; a restart begins another run.
         restarts: Numbers of actions after which the scene was restarted, or the machine held until its mask was found.
         end: How it ended: `ended`, `stopped`, or None where the log breaks off.
-        operator: Who commanded, if the log says so: `scripted`.
+        operator: Who commanded, if the log says so.
     """
 
     episode_index: int

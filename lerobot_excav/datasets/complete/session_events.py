@@ -70,10 +70,10 @@ class CommandEvent(_Event):
 
 
 class OperatorEvent(_Event):
-    """Another than a person commands this episode."""
+    """Who commands this episode: the last one that is named."""
 
     event: Literal["operator"]
-    operator: Literal["scripted"]
+    operator: Literal["scripted", "person", "policy"]
 
 
 class HeldEvent(_Event):

@@ -110,7 +110,7 @@ def test_who_commanded_is_a_person_unless_log_or_option_say_otherwise(small_data
     log.write_text("".join(lines))
     by_person = complete_recording(recording, log, out=tmp_path / "person")
     assert build_index(by_person)["operator"].tolist() == ["person", "scripted", "person", "person"]
-    with pytest.raises(DatasetError, match=r"--operator=policy, but .* scripted operator commanded episodes \[1\]"):
+    with pytest.raises(DatasetError, match=r"--operator=policy, but .* says who commanded \(episode 1: scripted\)"):
         complete_recording(recording, log, out=tmp_path / "c", operator="policy")
     assert main(["index", str(recording), f"--session={plain}", "--operator=policy", f"--out={tmp_path / 'p'}"]) == 0
     index = build_index(tmp_path / "p")
