@@ -5,7 +5,7 @@ every edit. With --select and --split it prints the flags that make stock lerobo
 
 Examples:
   lerobot-excav index outputs/paired
-      rebuild; list scenes with missing or duplicate targets
+      rebuild; list starts with missing or duplicate targets
   lerobot-excav index outputs/recorded --session=outputs/excavator_sim_sessions/2026-01-31_10-00-00.jsonl
       complete what lerobot-record recorded: replay it, verify it, add scene, target, task state and outcome
   lerobot-excav index outputs/rolled_out --session=outputs/session.jsonl --operator=policy
@@ -15,7 +15,7 @@ Examples:
   lerobot-excav index outputs/paired --split=scene --eval_fraction=0.2
       hold out a fifth of the scenes, with all their episodes
   lerobot-train ... --eval_steps=500 \
-      $(lerobot-excav index outputs/paired --select=non-paired --scenes=40 --split=episode --flags=true)
+      $(lerobot-excav index outputs/paired --select=non-paired --starts=40 --split=episode --flags=true)
       train on one episode of each of 40 scenes
 """
 
@@ -59,7 +59,7 @@ class IndexArguments(DatasetArguments):
     )
     select: str = setting("Composition of the episodes to train on", default="all", choices=COMPOSITIONS)
     episodes: int | None = setting("How many episodes; left out: as many as there are", default=None, low=1)
-    scenes: int | None = setting("How many scenes, for paired and non-paired", default=None, low=1)
+    starts: int | None = setting("How many starts, scenes at a stage, for paired and non-paired", default=None, low=1)
     include_failures: bool = setting("Whether to choose episodes without success as well", default=False)
     split: str | None = setting("Hold out whole scenes, or single episodes", default=None, choices=SPLIT_UNITS)
     eval_fraction: float | None = setting(
@@ -142,7 +142,7 @@ def _recover(arguments: IndexArguments) -> int:
 
 
 def _asks_for_episodes(arguments: IndexArguments) -> bool:
-    counts = arguments.episodes is not None or arguments.scenes is not None
+    counts = arguments.episodes is not None or arguments.starts is not None
     asked = arguments.flags or arguments.split or arguments.include_failures
     return bool(counts or asked or arguments.select != "all")
 
@@ -188,7 +188,7 @@ def _print_flags(arguments: IndexArguments, root: Path, index: pd.DataFrame) -> 
     require_one_version(versions_of(index), source=root)
     seed = arguments.seed or 0
     rows = usable(index, include_failures=arguments.include_failures)
-    rows = select(rows, arguments.select, episodes=arguments.episodes, scenes=arguments.scenes, seed=seed)
+    rows = select(rows, arguments.select, episodes=arguments.episodes, starts=arguments.starts, seed=seed)
     if arguments.split is None:
         parts = Split(train=rows["episode_index"].tolist(), evaluation=[])
     else:

@@ -302,7 +302,7 @@ COMMAND_TABLES = {
         "task": optional(text),
         "operator": optional(one_of("scripted", "person", "policy")),
         "select": one_of("all", "paired", "non-paired", "balanced"),
-        **dict.fromkeys(("episodes", "scenes"), optional(whole(1))),
+        **dict.fromkeys(("episodes", "starts"), optional(whole(1))),
         "split": optional(one_of("scene", "episode")),
         "eval_fraction": optional(number(0, below=1)),
         "seed": optional(whole(0)),

@@ -34,7 +34,7 @@ def test_the_index_is_rewritten_and_described(paired_dataset, output):
 
 
 def test_flags_alone_fit_into_a_command_line(paired_dataset, output):
-    text = output(paired_dataset, "--select=paired", "--scenes=3", "--split=scene", "--flags")
+    text = output(paired_dataset, "--select=paired", "--starts=3", "--split=scene", "--flags")
     episodes, ratio = shlex.split(text)
     assert len(episodes.removeprefix("--dataset.episodes=[").removesuffix("]").split(",")) == 12
     assert ratio == f"--dataset.eval_split={3.5 / 12}"

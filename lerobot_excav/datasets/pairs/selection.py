@@ -19,25 +19,25 @@ def usable(index: pd.DataFrame, *, include_failures: bool = False) -> pd.DataFra
 
 
 def select(
-    index: pd.DataFrame, composition: str, *, episodes: int | None = None, scenes: int | None = None, seed: int = 0
+    index: pd.DataFrame, composition: str, *, episodes: int | None = None, starts: int | None = None, seed: int = 0
 ) -> pd.DataFrame:
     """Choose a subset of episodes.
 
     - `all`: every row.
-    - `paired`: scenes shown with every target, each with all of them.
-    - `non-paired`: every scene once, targets as equally frequent as the scenes allow.
-    - `balanced`: every target equally often, from whatever scenes have it.
+    - `paired`: starts shown with every target, each with all of them.
+    - `non-paired`: every start once, targets as equally frequent as the starts allow.
+    - `balanced`: every target equally often, from whatever starts have it.
 
-    A scene at another stage or on another soil counts as another scene.
+    A start is a scene at a stage, on a soil.
 
-    Scenes are chosen at random, but the same seed chooses the same, and a smaller choice is part of a larger one
-    (except that `non-paired` may show a scene with another target).
+    Starts are chosen at random, but the same seed chooses the same, and a smaller choice is part of a larger one
+    (except that `non-paired` may show a start with another target).
 
     Args:
         index: Rows to choose from, one per pair and soil.
         composition: One of `COMPOSITIONS`.
         episodes: How many episodes; as many as possible by default.
-        scenes: How many scenes, in place of `episodes`; only for `paired` and `non-paired`.
+        starts: How many starts, in place of `episodes`; only for `paired` and `non-paired`.
         seed: Seed of the choice.
 
     Returns:
@@ -48,18 +48,18 @@ def select(
         DatasetError: The index holds too few episodes.
     """
     require_choice("select", composition, COMPOSITIONS)
-    require(episodes is None or scenes is None, "--episodes and --scenes exclude each other; give one of them")
+    require(episodes is None or starts is None, "--episodes and --starts exclude each other; give one of them")
     require(
-        scenes is None or composition in ("paired", "non-paired"),
-        f"--scenes has no meaning for --select={composition}; give --episodes",
+        starts is None or composition in ("paired", "non-paired"),
+        f"--starts has no meaning for --select={composition}; give --episodes",
     )
     if index.empty:
         raise DatasetError("the index has no usable episode; successes are required unless --include_failures")
-    shuffled = _shuffle_scenes(index, np.random.default_rng(seed))
+    shuffled = _shuffle_starts(index, np.random.default_rng(seed))
     if composition == "paired":
-        chosen = _paired(shuffled, episodes, scenes)
+        chosen = _paired(shuffled, episodes, starts)
     elif composition == "non-paired":
-        chosen = _non_paired(shuffled, scenes if episodes is None else episodes)
+        chosen = _non_paired(shuffled, starts if episodes is None else episodes)
     elif composition == "balanced":
         chosen = _balanced(shuffled, episodes)
     else:
@@ -67,39 +67,39 @@ def select(
     return chosen.sort_values("episode_index", ignore_index=True)
 
 
-def _shuffle_scenes(index: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """Order rows by a random order of the scenes, then by target; adds the column `scene_rank`."""
+def _shuffle_starts(index: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Order rows by a random order of the starts, then by target; adds the column `start_rank`."""
     start = start_columns(index)
     ordered = index.sort_values([*start, "target_id"])
     number = ordered.groupby(start).ngroup().to_numpy()
     rank = rng.permutation(number.max() + 1)
-    return ordered.assign(scene_rank=rank[number]).sort_values(["scene_rank", "target_id"])
+    return ordered.assign(start_rank=rank[number]).sort_values(["start_rank", "target_id"])
 
 
-def _paired(rows: pd.DataFrame, episodes: int | None, scenes: int | None) -> pd.DataFrame:
+def _paired(rows: pd.DataFrame, episodes: int | None, starts: int | None) -> pd.DataFrame:
     targets = rows["target_id"].nunique()
-    complete = rows.groupby("scene_rank")["target_id"].transform("nunique") == targets
+    complete = rows.groupby("start_rank")["target_id"].transform("nunique") == targets
     if episodes is not None:
-        require(episodes % targets == 0, f"--episodes={episodes} is not a multiple of the {targets} targets per scene")
-        scenes = episodes // targets
-    ranks = rows[complete]["scene_rank"].drop_duplicates()
+        require(episodes % targets == 0, f"--episodes={episodes} is not a multiple of the {targets} targets per start")
+        starts = episodes // targets
+    ranks = rows[complete]["start_rank"].drop_duplicates()
     if ranks.empty:
         raise DatasetError(
-            f"no scene has a usable episode for each of the {targets} targets, so there is nothing paired to choose; "
+            f"no start has a usable episode for each of the {targets} targets, so there is nothing paired to choose; "
             "record more, add --include_failures, or choose --select=balanced"
         )
-    return rows[rows["scene_rank"].isin(_first(ranks, scenes, "complete scenes"))]
+    return rows[rows["start_rank"].isin(_first(ranks, starts, "complete starts"))]
 
 
 def _non_paired(rows: pd.DataFrame, count: int | None) -> pd.DataFrame:
-    """Give each scene the target that is rarest so far among those it has."""
-    ranks = _first(rows["scene_rank"].drop_duplicates(), count, "scenes")
+    """Give each start the target that is rarest so far among those it has."""
+    ranks = _first(rows["start_rank"].drop_duplicates(), count, "starts")
     frequency = dict.fromkeys(sorted(rows["target_id"].unique()), 0)
     chosen = []
-    for _, scene in rows[rows["scene_rank"].isin(ranks)].groupby("scene_rank"):
-        target = min(scene["target_id"], key=lambda t: (frequency[t], t))
+    for _, start in rows[rows["start_rank"].isin(ranks)].groupby("start_rank"):
+        target = min(start["target_id"], key=lambda t: (frequency[t], t))
         frequency[target] += 1
-        chosen.append(scene.index[scene["target_id"] == target][0])
+        chosen.append(start.index[start["target_id"] == target][0])
     return rows.loc[chosen]
 
 

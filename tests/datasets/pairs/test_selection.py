@@ -66,16 +66,16 @@ def test_non_paired_targets_are_equally_frequent_where_all_scenes_have_all(scene
     index = index_of([(s, t) for s in range(scenes) for t in range(4)])
     if wanted > scenes:
         with pytest.raises(DatasetError, match=f"only {scenes} are there"):
-            select(index, "non-paired", scenes=wanted, seed=seed)
+            select(index, "non-paired", starts=wanted, seed=seed)
         return
-    frequency = Counter(select(index, "non-paired", scenes=wanted, seed=seed)["target_id"])
+    frequency = Counter(select(index, "non-paired", starts=wanted, seed=seed)["target_id"])
     assert max(frequency.values()) - min(frequency[t] for t in range(4)) <= 1
 
 
 @given(few=st.integers(1, 6), more=st.integers(0, 6), seed=st.integers(0, 5))
 def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
     index = index_of([(s, t) for s in range(12) for t in range(4)])
-    small = select(index, "paired", scenes=few, seed=seed)["episode_index"]
+    small = select(index, "paired", starts=few, seed=seed)["episode_index"]
     large = select(index, "paired", episodes=4 * (few + more), seed=seed)["episode_index"]
     assert set(small) <= set(large)
     assert len(small) == 4 * few
@@ -86,8 +86,8 @@ def test_a_smaller_paired_selection_is_part_of_a_larger_one(few, more, seed):
     [
         ({"composition": "odd"}, "--select|select="),
         ({"composition": "paired", "episodes": 6}, "not a multiple of the 4 targets"),
-        ({"composition": "paired", "episodes": 4, "scenes": 1}, "exclude each other"),
-        ({"composition": "balanced", "scenes": 1}, "--scenes has no meaning"),
+        ({"composition": "paired", "episodes": 4, "starts": 1}, "exclude each other"),
+        ({"composition": "balanced", "starts": 1}, "--starts has no meaning"),
         ({"composition": "balanced", "episodes": 3}, "cannot be balanced"),
         ({"composition": "all", "episodes": 0}, "at least 1"),
     ],
@@ -100,7 +100,7 @@ def test_contradictory_arguments_are_named(arguments, message):
 
 def test_the_seed_changes_the_choice():
     index = index_of([(s, t) for s in range(12) for t in range(4)])
-    assert len({tuple(select(index, "paired", scenes=3, seed=seed)["scene_id"]) for seed in range(8)}) > 1
+    assert len({tuple(select(index, "paired", starts=3, seed=seed)["scene_id"]) for seed in range(8)}) > 1
 
 
 def test_failures_rejected_episodes_and_repetitions_are_not_usable():
