@@ -23,7 +23,7 @@ CUT_LENGTH_M = 2.5
 CUT_DEPTH_M = 0.41
 ENTRY_LENGTH_M = 0.35
 """Length over which the edge goes down to that depth [m]."""
-ENTRY_AHEAD_M = 0.08
+ENTRY_AHEAD_M = 0.2
 """How far behind the centre of the region the cut begins, seen from the machine [m]."""
 FLOOR_CLEARANCE_M = 0.01
 FULL_BUCKET_M3 = 0.42

@@ -29,7 +29,7 @@ def draw_variation(rng: np.random.Generator, *, phase_count: int) -> Variation:
     """Draw the style of one cycle, with a pause before each of its phases."""
     return Variation(
         speed=rng.uniform(0.85, 1.0),
-        entry_along_m=rng.uniform(0.0, 0.16),
+        entry_along_m=rng.uniform(0.12, 0.28),
         entry_across_m=rng.uniform(-0.1, 0.1),
         depth_m=rng.uniform(0.36, 0.46),
         attack_pitch_rad=rng.uniform(-1.5, -1.3),
