@@ -19,9 +19,9 @@ THIN_SOIL_M = 0.2
 last half metre of soil as thin as this, while the bucket is rolled in."""
 LOOK_LENGTH_M = 1.5
 """Over which it is looked at, from the entry towards the machine [m]: about what a cut takes (kind: tuned)."""
-MOST_RADIUS_M = 6.3
-"""Where the edge enters at the farthest [m]: beyond, only a bucket that points outwards would reach the floor
-(kind: derived)."""
+MOST_RADIUS_M = 6.1
+"""Where the edge enters at the farthest [m]: beyond, only a bucket that points outwards would reach the floor,
+and from 6.15 on the way down to bare ground has a jump (kind: derived)."""
 END_RADIUS_M = 3.0
 """Where the edge stops at the latest [m]: what it pushes ahead is left where a later cut can begin behind it (kind:
 tuned on train scenes)."""
