@@ -15,6 +15,7 @@ README = (ROOT / "README.md").read_text()
 # What makes a command quick without making it another command.
 SMALLER = {
     "--scenes": "1",
+    "--stages": "0",
     "--steps": "3",
     "--save_freq": "3",
     "--batch_size": "2",

@@ -250,11 +250,11 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     def _reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
         for _ in range(self.task_spec.target_count - 1):
             try:
-                return self.env.reset(options=dict(self.start))  # type: ignore[no-any-return]
+                return self.env.reset(options=dict(self.start))
             except TargetAbsentError as absent:  # late stages of a scene have fewer regions
                 logger.warning("%s; the next one is shown", absent)
                 self._order.skip()
-        return self.env.reset(options=dict(self.start))  # type: ignore[no-any-return]
+        return self.env.reset(options=dict(self.start))
 
     def _begin_episode(self, episode_index: int) -> None:
         self._order.begin(episode_index)

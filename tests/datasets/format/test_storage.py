@@ -11,7 +11,7 @@ from lerobot.datasets import delete_episodes, merge_datasets, split_dataset
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.format.dataset_info import read_info
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
-from lerobot_excav.datasets.format.schema import COMMAND_KEY, PAIR_KEY, SCENE_KEY, TARGET_KEY
+from lerobot_excav.datasets.format.schema import COMMAND_KEY, PAIR_KEY, SCENE_KEY, STAGE_KEY, TARGET_KEY
 from lerobot_excav.datasets.format.storage import STORAGES
 from lerobot_excav.datasets.pairs.paired_index import build_index
 from lerobot_excav.datasets.record.simulation import play_demonstration
@@ -127,7 +127,7 @@ def test_videos_and_commands_survive_lerobots_tools(changing_datasets, tmp_path)
     parts = split_dataset(load(original), {"a": [0, 5], "b": [1, 7]}, output_dir=tmp_path)
     # Merging puts the episodes of a camera into one file.
     merged = merge_datasets([parts["b"], parts["a"]], "local/m", output_dir=tmp_path / "m").root
-    keys = (MAIN, PAIR_KEY, SCENE_KEY, TARGET_KEY)
+    keys = (MAIN, PAIR_KEY, SCENE_KEY, STAGE_KEY, TARGET_KEY)
     pictures = {episode.pair.uid: episode.image(MAIN, 5) for episode in iterate_episodes(original, keys)}
     for root, count in ((tmp_path / "d", 7), (tmp_path / "a", 2), (merged, 4)):
         report = check_dataset(root, replays=1)

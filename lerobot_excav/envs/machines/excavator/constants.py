@@ -18,8 +18,7 @@ JOINT_NAMES = ("swing", "boom", "arm", "bucket")
 # --- kinematics -------------------------------------------------------------------------------------
 
 MACHINE_POS_W = (-4.6, 0.0, 0.0)  # puts the 6 m dig area inside the digging envelope (kind: tuned)
-DIG_AREA_EXTENT_M = (6.0, 6.0)
-"""Size of the soil grid along x and y [m], centred on the world origin (kind: design)."""
+DIG_AREA_EXTENT_M = (6.0, 6.0)  # size of the soil grid along x and y, centred on the world origin (kind: tuned)
 SWING_HEIGHT_M = 0.77  # top of the slewing ring of an 8-t undercarriage (kind: guess)
 BOOM_PIN_S = (0.75, 0.0, 0.38)  # fitted to the DX80R working ranges (kind: derived)
 BOOM_LENGTH_M = 3.60  # pin to pin; fitted to the DX80R ranges (kind: derived)
