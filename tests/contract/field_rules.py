@@ -271,19 +271,24 @@ SCENES = {
     "target_rule": one_of("round", "uniform", "nearest").beside(targets=1),
     "seed": whole(0, SEED),
 }
-STAGES = ("0", "15", "0,4,8", "8, 0", "16", "0,,4", "4,4", "-1", "1.5", "0;4", "²", "9" * 5000)
+GOOD_STAGES = ("0", "19", "0,4,8", "8, 0", "0,1-13", "3-3")
+BAD_STAGES = ("5-3", "0-4,4", "1-20", "1-2-3", "20", "0,,4", "4,4", "-1", "1.5", "0;4", "²", "9" * 5000)
 
 
 def is_stage_list(value):
     """Tell whether a value lists stages of the excavator, each once."""
     words = [word.strip() for word in value.split(",")] if isinstance(value, str) else []
-    known = {str(number) for number in range(16)}
-    return bool(words) and set(words) <= known and len(set(words)) == len(words)
+    ranges = [word.split("-") for word in words]
+    known = {str(number) for number in range(20)}
+    if not words or not all(set(ends) <= known and len(ends) < 3 for ends in ranges):
+        return False
+    named = [stage for ends in ranges for stage in range(int(ends[0]), int(ends[-1]) + 1)]
+    return all(int(ends[0]) <= int(ends[-1]) for ends in ranges) and len(set(named)) == len(named)
 
 
 DEMOS = {
     **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
-    "stages": Rule(is_stage_list, STAGES, is_text=True),
+    "stages": Rule(is_stage_list, GOOD_STAGES + BAD_STAGES, is_text=True),
 }
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}

@@ -2,16 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.storage import STORAGES
-from lerobot_excav.datasets.record.stage_list import parse_stages, stage_list
+from lerobot_excav.datasets.record.stage_list import draw_stages, parse_stages, stage_list
 from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_start
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
-from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE, TaskSettings
+from lerobot_excav.envs.tasks.settings import LAST_SCENE, SCENE_SETS, TARGETS_PER_SCENE, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import ConfigurationError, require, require_choice, shown
 from lerobot_excav.setting import check_settings, declared_settings, setting
@@ -95,21 +94,25 @@ class PlayedScenes:
         return range(self.first_scene, self.first_scene + self.scenes)
 
     @property
-    def start_stages(self) -> tuple[int, ...]:
-        """The stages that every scene is shown at, rising."""
-        return (0,)
+    def listed_stages(self) -> tuple[range, ...]:
+        """What the stages of a scene are drawn from: one of each range, which may hold a single one; rising."""
+        return (range(1),)
+
+    def stages_of(self, scene_id: int) -> tuple[int, ...]:
+        """Return the stages that a scene is shown at, rising."""
+        return draw_stages(self.listed_stages, self.seed, SCENE_SETS.index(self.env.scene_set), scene_id)
 
     @property
     def episode_count(self) -> int:
         """How many episodes are to be played."""
-        return self.scenes * len(self.start_stages) * (self.targets or 1)  # it has been filled in
+        return self.scenes * len(self.listed_stages) * (self.targets or 1)  # it has been filled in
 
     def pairs(self) -> list[Pair]:
         """Return the episodes to play, in their order: those of a scene side by side, and of a stage within it."""
         return [
             pair
             for scene_id in self.scene_ids
-            for stage in self.start_stages
+            for stage in self.stages_of(scene_id)
             for pair in self.pairs_of_start(scene_id, stage)
         ]
 
@@ -122,7 +125,7 @@ class PlayedScenes:
             settings=self.env,
             scene_id=scene_id,
             stage=stage,
-            place=self.start_stages.index(stage),
+            place=self.stages_of(scene_id).index(stage),
         )
         return [self.pair(scene_id, stage, target_id) for target_id in targets]
 
@@ -149,7 +152,8 @@ class DemonstrationSettings(PlayedScenes):
     keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
     stages: str = setting(
         "Stages at which every scene is shown, such as 0,4,8: after so many cycles that a seeded operator has dug "
-        "before. From stage 1 on an episode starts where the last dump has ended",
+        "before; 0,1-13 shows it at 0 and at one drawn from 1 to 13. From stage 1 on an episode starts where the last "
+        "dump has ended",
         default="0",
     )
 
@@ -159,14 +163,18 @@ class DemonstrationSettings(PlayedScenes):
         self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
 
     @property
-    def start_stages(self) -> tuple[int, ...]:
-        """The stages that every scene is shown at, rising."""
+    def listed_stages(self) -> tuple[range, ...]:
+        """What the stages of a scene are drawn from: one of each range, which may hold a single one; rising."""
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
 
     def possible_pairs(self) -> list[Pair]:
         """Return the episodes that may be played, whichever targets the rule chooses."""
-        targets = range(self.task_spec.target_count)
-        return [self.pair(*start, target) for start in product(self.scene_ids, self.start_stages) for target in targets]
+        return [
+            self.pair(scene_id, stage, target_id)
+            for scene_id in self.scene_ids
+            for stage in self.stages_of(scene_id)
+            for target_id in range(self.task_spec.target_count)
+        ]
 
     @classmethod
     def of(cls, env_type: str, env: Mapping[str, Any] | None = None, **settings: Any) -> "DemonstrationSettings":

@@ -168,7 +168,7 @@ def _start(
     pool: Executor, progress: EpisodeProgress, settings: DemonstrationSettings, folder: Path
 ) -> list[Future[list[Outcome]]]:
     """Submit all episodes in their order: one by one, or scene by scene where stages of a scene are to be reached."""
-    if settings.start_stages != (0,):
+    if settings.stages != "0":
         return [submit_episodes(pool, progress, simulate_scene, settings, i, folder) for i in settings.scene_ids]
     return [_start_one(pool, progress, settings, pair, folder) for pair in settings.pairs()]
 

@@ -32,7 +32,7 @@ def simulate_scene(settings: DemonstrationSettings, scene_id: int, folder: Path)
         ExcavError: An episode could not be played; the message names it.
     """
     outcomes = []
-    for stage in settings.start_stages:
+    for stage in settings.stages_of(scene_id):
         # To find the nearest target of a later start is to reach it, so one that was found is not looked for again.
         found = EpisodeStore(folder).pairs_of_start(settings.pair(scene_id, stage, 0))
         is_known = settings.target_rule == "nearest" and len(found) == 1

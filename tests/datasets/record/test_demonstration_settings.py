@@ -82,7 +82,10 @@ def test_the_nearest_target_is_that_of_the_scene(env_type):
             {"target_rule": "nearest"},
             "--target_rule=nearest has no meaning for --env.type=excavator with Clear-v0",
         ),
-        ("excavator", {}, {"stages": "0,16"}, "--stages='0,16' is not possible; the last stage of Scoop-v0 is 15"),
+        ("excavator", {}, {"stages": "0,20"}, "--stages='0,20' is not possible; the last stage of Scoop-v0 is 19"),
+        ("excavator", {}, {"stages": "1-20"}, "--stages='1-20' is not possible; the last stage of Scoop-v0 is 19"),
+        ("excavator", {}, {"stages": "5-3"}, "--stages='5-3' is not possible; give whole numbers with commas"),
+        ("excavator", {}, {"stages": "0-4,4"}, "--stages='0-4,4' names a stage twice"),
         ("excavator", {}, {"stages": "4,0,4"}, "--stages='4,0,4' names a stage twice"),
         ("excavator", {}, {"stages": "0,-1"}, "--stages='0,-1' is not possible; give whole numbers with commas"),
         ("excavator", {}, {"stages": ""}, "--stages='' is not possible"),
@@ -134,3 +137,24 @@ def test_stored_settings_that_do_not_fit_are_refused(changes, message):
     record = {name: value for name, value in record.items() if value is not ...}
     with pytest.raises(ConfigurationError, match=message):
         DemonstrationSettings.from_record(record, source=SOURCE)
+
+
+def test_a_stage_is_drawn_for_every_scene_from_the_range_that_is_listed():
+    settings = make("excavator", scenes=400, stages="1-8, 0")
+    assert settings.stages == "0,1-8"
+    later = [settings.stages_of(scene_id)[1] for scene_id in range(400)]
+    assert {settings.stages_of(scene_id)[0] for scene_id in range(400)} == {0}
+    assert set(later) == set(range(1, 9))
+    assert min(Counter(later).values()) > 25  # 50 each, 3.8 standard deviations below
+    assert [pair.stage for pair in settings.pairs()[4:8]] == [later[0]] * 4
+    assert settings.episode_count == len(settings.pairs()) == 3200
+
+
+def test_drawn_stages_depend_on_scene_set_and_seed_and_not_on_the_other_scenes():
+    def later(first_scene=0, **settings):
+        made = make("excavator", settings.pop("env", {}), scenes=50, stages="1-19", **settings)
+        return [made.stages_of(scene_id) for scene_id in range(first_scene, 50)]
+
+    assert later(first_scene=7) == later()[7:]
+    assert later(seed=1) != later()
+    assert later(env={"scene_set": "val"}) != later()

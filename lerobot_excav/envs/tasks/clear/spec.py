@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S, SCOOP
 
-CYCLES = 16
+CYCLES = 20
 """Cycles of an episode at most (kind: guess; ten of 435 kg are less than 84 % of a pile of 5.4 t)."""
 
 LEAST_REMOVED = 0.75

@@ -70,6 +70,6 @@ SCOOP = TaskSpec(
     nearest_target_entry="lerobot_excav.envs.tasks.scoop.nearest_region:nearest_target",
     task_state_tolerance=1e-2,  # [kg], [m], or a count (kind: guess; the same build repeats exactly)
     judges_at_the_end=False,
-    last_stage=15,
+    last_stage=19,
     cuts_rest=True,
 )
