@@ -53,7 +53,7 @@ def difference_cells(column: Column, change: Difference) -> list[str]:
     return [interval_text(change.difference, scale=column.scale, sign="+"), p_value]
 
 
-def interval_text(interval: Interval, *, scale: float = 1.0, sign: str = "") -> str:
+def interval_text(interval: Interval, *, scale: float = 1.0, sign: str = "", digits: int = 1) -> str:
     """Write an estimate and its interval, as `40.0 [16.8, 68.7]`."""
     low, estimate, high = (scale * value for value in (interval.low, interval.estimate, interval.high))
-    return f"{estimate:{sign}.1f} [{low:{sign}.1f}, {high:{sign}.1f}]"
+    return f"{estimate:{sign}.{digits}f} [{low:{sign}.{digits}f}, {high:{sign}.{digits}f}]"

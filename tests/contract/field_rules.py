@@ -317,6 +317,11 @@ COMMAND_TABLES = {
         **dict.fromkeys(("rows", "metrics_folder", "operator", "out"), optional(path)),
         "seed": whole(0),
     },
+    "audit": {
+        **dict.fromkeys(("checkpoint", "against", "out"), optional(path)),
+        **{"first_scene": whole(0, ENDLESS), "scenes": whole(1, 10_000), "stage": whole(0, 1000), **WORK},
+        **{"n_action_steps": each(whole(1)), "ensemble": optional(number(-10, 10)), "seed": whole(0, SEED)},
+    },
     "export": {
         **dict.fromkeys(("checkpoint", "out", "results"), optional(path)),
         **dict.fromkeys(("title", "license"), text),

@@ -45,6 +45,7 @@ REACH = TaskSpec(
     operator_entry="toy_reach.operator:ReachOperator",
     measures_entry="toy_reach.measures:REACH_MEASURES",
     nearest_target_entry="toy_reach.table:nearest_target",
+    place_probe_entry="toy_reach.place_probe:ArrivedPlace",
     task_state_tolerance=1e-6,
     judges_at_the_end=False,
 )

@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.tasks.acted_place import PlaceProbe
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE, TaskSettings
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class TaskSpec:
         measures_entry: The `TaskMeasures`.
         nearest_target_entry: Function from settings, scene and stage to the target that is nearest at the start, as
             the task understands it; None if the task defines no such thing.
+        place_probe_entry: Class that tells where the machine acts, a `PlaceProbe`; None if the task cannot be audited.
         task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
         target_count: Targets of a scene.
@@ -92,6 +94,7 @@ class TaskSpec:
     operator_entry: str
     measures_entry: str
     nearest_target_entry: str | None = None
+    place_probe_entry: str | None = None
     task_state_tolerance: float
     judges_at_the_end: bool
     target_count: int = TARGETS_PER_SCENE
@@ -132,6 +135,12 @@ class TaskSpec:
         """Return the target that is nearest at the start of a scene, at a stage."""
         assert self.nearest_target_entry is not None  # what offers the choice checks it
         return int(resolve_name(self.nearest_target_entry)(settings, scene_id, stage))
+
+    def make_place_probe(self, env: Any) -> PlaceProbe:
+        """Make what tells where the machine acts, for an environment that was just reset."""
+        assert self.place_probe_entry is not None  # what offers an audit checks it
+        probe: PlaceProbe = resolve_name(self.place_probe_entry)(env)
+        return probe
 
     def observation_space(self, obs_type: str, size: tuple[int, int]) -> gym.spaces.Dict:
         """Return the space of observations of one of `OBS_TYPES`; pictures are (height, width) [px]."""

@@ -15,12 +15,12 @@ from lerobot_excav.envs.tasks.clear.cycle_record import (
     CycleRecord,
     commanded,
     failure_of,
-    missing_soil,
     place,
 )
 from lerobot_excav.envs.tasks.clear.event_list import EventList
 from lerobot_excav.envs.tasks.planner.plan import Proposal
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG, SETTLING_TICKS, DigCycle
+from lerobot_excav.envs.tasks.scoop.missing_soil import missing_soil
 from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S
 
 _HALF_DIG_AREA_M = 0.5 * np.array(DIG_AREA_EXTENT_M)

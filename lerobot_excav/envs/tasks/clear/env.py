@@ -33,7 +33,7 @@ class ClearEnv(ExcavatorEnv):
     region among the planner's proposals: 0 unless options of `reset` say otherwise.
 
     A cycle is over when the bucket has been emptied into the box, when all of a lifted load was lost before the box, or
-    after 25 s. The episode is over after 16 cycles, when nothing is left that is worth a cycle, or at the time limit.
+    after 25 s. The episode is over after 20 cycles, when nothing is left that is worth a cycle, or at the time limit.
 
     Scene, observation and action are those of `Scoop-v0`.
 

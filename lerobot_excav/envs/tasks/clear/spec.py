@@ -17,6 +17,7 @@ CLEAR = replace(
     duration_s=CYCLES * CYCLE_LIMIT_S,
     env_entry="lerobot_excav.envs.tasks.clear.env:ClearEnv",
     measures_entry="lerobot_excav.envs.tasks.clear.measures:CLEAR_MEASURES",
+    place_probe_entry=None,  # an audit looks at single scoops
     nearest_target_entry=None,  # targets are ranks of the planner's proposals
     judges_at_the_end=True,
     default_target=0,

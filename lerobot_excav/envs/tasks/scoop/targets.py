@@ -1,6 +1,6 @@
 """Dig regions: where on a pile a scoop can be commanded, and the image mask that commands it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,10 @@ class Target:
         across = np.array([-along[1], along[0]])
         offsets = np.array([-along - across, along - across, along + across, across - along])
         return np.asarray(self.center_w[:2] + offsets)
+
+    def grown(self, margin_m: float) -> "Target":
+        """Return the patch with a margin around it [m]."""
+        return replace(self, size_m=self.size_m + 2.0 * margin_m)
 
     def contains(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points (..., 2) or (..., 3) [m], world frame, lie above, on or below the patch; NaN is outside."""

@@ -9,10 +9,11 @@ import pytest
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX
 from lerobot_excav.envs.tasks.clear import clearing as clearing_module
 from lerobot_excav.envs.tasks.clear import env as env_module
-from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, failure_of, missing_soil
+from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, failure_of
 from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord, clear_outcome
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
+from lerobot_excav.envs.tasks.scoop.missing_soil import missing_soil
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 from lerobot_excav.errors import ConfigurationError

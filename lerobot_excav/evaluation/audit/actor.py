@@ -1,0 +1,91 @@
+"""Who acts in an audit: a policy from a checkpoint, or the scripted operator."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.errors import ConfigurationError
+
+
+class Actor(Protocol):
+    """Whoever commands the machine."""
+
+    def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
+        """Start from the present state, without a memory of what was before."""
+
+    def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> NDArray[np.float32]:
+        """Return the next action, (actions,)."""
+
+
+MakeActor = Callable[[], Actor]
+
+
+class OperatorActor:
+    """The scripted operator of a task.
+
+    Args:
+        env: An environment of the task.
+        rng: Source of the operator's style.
+    """
+
+    def __init__(self, env: MaskedTaskEnv[Any, Any], rng: np.random.Generator) -> None:
+        self._operator = env.task_spec.make_operator(rng)
+
+    def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
+        """Let it look at the scene."""
+        self._operator.reset(env)
+
+    def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> NDArray[np.float32]:
+        """Return its next action, (actions,)."""
+        return np.asarray(self._operator.act(env), np.float32)
+
+
+class PolicyActor:
+    """A trained policy, loaded and called as `lerobot-eval` does it.
+
+    Args:
+        checkpoint: A `pretrained_model` folder.
+        overrides: Settings of the policy that differ from the checkpoint's, such as `("--n_action_steps=3",)`.
+
+    Raises:
+        ConfigurationError: The folder holds no policy, or a setting is not possible.
+    """
+
+    def __init__(self, checkpoint: Path, overrides: tuple[str, ...] = ()) -> None:
+        import torch
+        from lerobot.configs import PreTrainedConfig
+        from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+        from lerobot.utils.import_utils import register_third_party_plugins
+
+        register_third_party_plugins()
+        if not (checkpoint / "config.json").is_file():
+            raise ConfigurationError(
+                f"{checkpoint} holds no policy (config.json is missing); give the pretrained_model folder of a run of "
+                "lerobot-train, or a folder that lerobot-excav export has written"
+            )
+        config = PreTrainedConfig.from_pretrained(checkpoint, cli_overrides=list(overrides))
+        config.pretrained_path = checkpoint
+        self._torch = torch
+        self._policy = get_policy_class(config.type).from_pretrained(checkpoint, config=config)
+        self._policy.eval()
+        device = {"device_processor": {"device": str(config.device)}}
+        self._before, self._after = make_pre_post_processors(
+            config, pretrained_path=str(checkpoint), preprocessor_overrides=device
+        )
+
+    def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
+        """Forget plans and targets."""
+        self._policy.reset()
+
+    def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> NDArray[np.float32]:
+        """Return its next action, (actions,)."""
+        from lerobot.envs.utils import preprocess_observation
+
+        batch = preprocess_observation(observation) | {"task": [env.task_description]}
+        with self._torch.inference_mode():
+            action = self._after(self._policy.select_action(self._before(batch)))
+        return np.asarray(action[0].numpy(), np.float32)
