@@ -23,7 +23,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo tutorial demo-fr5 table-manipulation test test-lowest test-long fuzz validate lint type docs wheel clean
+.PHONY: help setup demo tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -57,6 +57,9 @@ demo-fr5: $(READY) ## the trained grasping policy plays a few test scenes; leave
 
 table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluations, report (hours; JOBS=2; run again to continue)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/fr5_grasp/Snakefile --cores $(JOBS)
+
+table-excavator: $(READY) ## the excavator's table: data, trainings, evaluations, audit, report (more than a day; JOBS=2; run again to continue)
+	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/excavator/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
 	@OMP_NUM_THREADS=1 $(RUN)/python $(PYTEST)

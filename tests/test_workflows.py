@@ -1,5 +1,6 @@
 """The workflows plan their stages, and their commands are ones that the programs would accept."""
 
+import ast
 import re
 import shlex
 import subprocess
@@ -11,27 +12,46 @@ import draccus
 import pytest
 from lerobot.configs.eval import EvalPipelineConfig
 from lerobot.configs.train import TrainPipelineConfig
+from lerobot.scripts.lerobot_edit_dataset import EditDatasetConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers what the commands name
+from lerobot_excav.datasets.format.schema import excav_features
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
 from lerobot_excav.evaluation.result_page.contents import read_contents
 from lerobot_excav.scripts.arguments import parse_arguments
 
 ROOT = Path(__file__).parents[1]
 SNAKEFILE = ROOT / "workflows" / "fr5_grasp" / "Snakefile"
+EXCAVATOR = ROOT / "workflows" / "excavator" / "Snakefile"
 EPISODE_FLAGS = "--dataset.episodes=[0,1,2,3] --dataset.eval_split=0.25"
-PROGRAM = re.compile(r"(?:lerobot-excav|lerobot-train|lerobot-eval) .*")
+PROGRAM = re.compile(r"(?:lerobot-excav|lerobot-train|lerobot-eval|lerobot-edit-dataset) .*")
+
+
+def dry_run(snakefile, folder, *options):
+    """Return what a dry run says it would do in a folder."""
+    command = [sys.executable, "-m", "snakemake", "-s", str(snakefile), "--cores", "2", "-n", "-p"]
+    done = subprocess.run([*command, "--config", *options], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
-    """What a dry run says it would do, in a folder where nothing has been done."""
-    folder = tmp_path_factory.mktemp("plan")
-    command = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "2", "-n", "-p"]
-    options = ["--config", "out=elsewhere", "results=elsewhere/page", "steps=2000"]
-    done = subprocess.run([*command, *options], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout + done.stderr
+    """The plan of the arm's workflow, in a folder where nothing has been done."""
+    options = ("out=elsewhere", "results=elsewhere/page", "steps=2000")
+    return dry_run(SNAKEFILE, tmp_path_factory.mktemp("plan"), *options)
+
+
+@pytest.fixture(scope="module")
+def dig_plan(tmp_path_factory):
+    """The plan of the excavator's workflow, in a folder where nothing has been done."""
+    return dry_run(EXCAVATOR, tmp_path_factory.mktemp("dig_plan"), "out=elsewhere", "results=page", "steps=2000")
+
+
+def counts(plan):
+    """Return how many jobs of every rule are planned."""
+    return {name: int(number) for name, number in re.findall(r"^(\w+) +(\d+)$", plan, re.MULTILINE)}
 
 
 def commands(plan):
@@ -53,6 +73,8 @@ def parse(words):
         # A training that continues finds its dataset in its file, which is not there yet.
         options = ["--dataset.repo_id=a/b" if o.startswith("--config_path=") else o for o in options]
         draccus.parse(TrainPipelineConfig, args=options)
+    elif program == "lerobot-edit-dataset":
+        draccus.parse(EditDatasetConfig, args=options)
     else:
         # LeRobot itself reads --policy.* from the checkpoint, which is not there yet.
         assert any(option.startswith("--policy.path=") for option in options)
@@ -60,16 +82,53 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    counts = {name: int(number) for name, number in re.findall(r"^(\w+) +(\d+)$", plan, re.MULTILINE)}
     stages = {"data": 3, "train": 5, "val": 4, "test": 22, "checkpoint": 1, "report": 1, "all": 1}
-    assert counts == {**stages, "total": sum(stages.values())}
+    assert counts(plan) == {**stages, "total": sum(stages.values())}
+
+
+def test_every_stage_of_the_excavator_is_planned(dig_plan):
+    stages = {"data": 3, "slim": 3, "train": 15, "checkpoint": 15, "play": 30, "operator": 2}
+    stages |= {"audit": 1, "report": 1, "all": 1}
+    assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
+
+
+def test_what_has_landed_is_not_planned_again(tmp_path):
+    """A row needs neither its data nor its training any more, and a checkpoint not its training."""
+    for policy, seed, tasks in (("paired_token", 1000, ("scoop", "clear")), ("no_condition", 1002, ("scoop",))):
+        (tmp_path / "page" / "checkpoints" / f"{policy}-{seed}").mkdir(parents=True)
+        (tmp_path / "page" / "metrics").mkdir(exist_ok=True)
+        for task in tasks:
+            (tmp_path / "page" / "metrics" / f"{task}_{policy}-{seed}.jsonl").touch()
+    plan = dry_run(EXCAVATOR, tmp_path, "out=elsewhere", "results=page")
+    assert {name: counts(plan)[name] for name in ("train", "checkpoint", "play")} == {
+        **{"train": 13, "checkpoint": 13, "play": 27},
+    }
+
+
+def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
+    """But for their data, their masks and their seed."""
+    own = ("--seed=", "--dataset.", "--output_dir=", "--policy.target_token=", "--policy.withhold_mask=")
+    trainings = [words for words in commands(dig_plan) if words[0] == "lerobot-train" and "--steps=2000" in words]
+    shared = {tuple(word for word in words if not word.startswith(own)) for words in trainings}
+    assert (len(trainings), len(shared)) == (15, 1)
+    recordings = [words for words in commands(dig_plan) if words[:2] == ["lerobot-excav", "demos"]]
+    numbers = [dict(word.lstrip("-").split("=", 1) for word in words[2:]) for words in recordings]
+    assert {int(options["scenes"]) * int(options["targets"]) for options in numbers} == {120}
+    assert len({options["stages"] for options in numbers}) == 1
+
+
+def test_the_slim_copy_leaves_out_every_column_that_no_policy_reads(dig_plan):
+    slim = next(words for words in commands(dig_plan) if words[0] == "lerobot-edit-dataset")
+    (names,) = (word.partition("=")[2] for word in slim if word.startswith("--operation.feature_names="))
+    assert sorted(ast.literal_eval(names)) == sorted(excav_features(SCOOP))
 
 
 @pytest.mark.slow
-def test_commands_are_accepted_by_their_programs(plan, monkeypatch):
+@pytest.mark.parametrize("name", ["plan", "dig_plan"])
+def test_commands_are_accepted_by_their_programs(name, request, monkeypatch):
     monkeypatch.setattr("sys.argv", ["test"])  # LeRobot looks there, too
-    found = commands(plan)
-    assert {words[0] for words in found} == {"lerobot-excav", "lerobot-train", "lerobot-eval"}
+    found = commands(request.getfixturevalue(name))
+    assert {words[0] for words in found} >= {"lerobot-excav", "lerobot-train", "lerobot-eval"}
     for words in found:
         parse(words)
 
@@ -92,6 +151,12 @@ def test_the_page_shows_what_the_stages_make(plan):
     assert rows <= made
     assert rows | curves == made
     assert {curve.folder for curve in contents.curve} == {str(folder.parent) for folder in curves}
+
+
+def test_the_page_of_the_excavator_shows_what_the_stages_make(dig_plan):
+    contents = read_contents(EXCAVATOR.with_name("rows.toml"), metrics=Path("page/metrics"))
+    made = {Path(path).stem for path in re.findall(r"output: (\S+\.jsonl)", dig_plan)}
+    assert made == {name for row in contents.rows for name in row.names}
 
 
 @pytest.mark.slow
@@ -128,5 +193,5 @@ def test_the_landed_page_is_made_of_what_lies_beside_it():
     listed = set(ReportFolder(folder).own)
     assert listed == {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()} - {LIST}
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=folder / "metrics")
-    assert all(contents.metrics_path(row.label).is_file() for row in contents.rows)
+    assert all(contents.metrics_paths(row) for row in contents.rows)
     assert all(list(Path(curve.folder).glob("*.jsonl")) for curve in contents.curve)

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.measures import Column, EpisodeKey, Kind
 from lerobot_excav.errors import DatasetError, require
+from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, newcombe_interval, paired_bootstrap
+from lerobot_excav.evaluation.seed_bootstrap import difference_over_seeds
+from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, newcombe_interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,15 +21,16 @@ class Difference:
 
     Attributes:
         measure: Key of its column.
-        difference: Second minus first, over scenes and targets; with Newcombe's interval where there is a p-value, else
-            with the bootstrap's.
-        p_value: McNemar's exact test; None for measures that are not rates, or with several seeds, whose episodes on
-            one scene are not independent.
+        difference: Second minus first, over scenes and targets; of rates with single seeds with Newcombe's interval,
+            else with that of a bootstrap over seeds and scenes.
+        p_value: McNemar's exact test where the interval is Newcombe's, else that of the bootstrap.
+        p_corrected: Corrected for the number of rows that are compared with one reference; None where only one is.
     """
 
     measure: str
     difference: Interval
-    p_value: float | None
+    p_value: float
+    p_corrected: float | None = None
 
 
 def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Difference]:
@@ -58,7 +61,7 @@ def matched(run: Run, reference: Run, measure: str) -> NDArray[Any]:
             "make it longer with `lerobot-excav operator --scenes=…`"
         )
     require(len(reference.evaluations) == 1, "the operator's run must be a single evaluation")
-    return np.array([_mean(reference, key, measure) for key in run.keys])
+    return np.array([_value(reference.first, key, measure) for key in run.keys])
 
 
 def require_same_task(first: Run, second: Run) -> None:
@@ -75,9 +78,9 @@ def difference_of_worlds(first: Run, second: Run) -> str:
     return f"{played}, where a number means another scene"
 
 
-def means_by_key(run: Run, measure: str) -> NDArray[Any]:
-    """Return a measure per scene and target, averaged over seeds, in the order of `run.keys`."""
-    return np.array([_mean(run, key, measure) for key in run.keys])
+def values_by_seed(run: Run, measure: str) -> NDArray[np.float64]:
+    """Return a measure (seeds, scenes and targets), in the order of `run.keys`."""
+    return np.array([[_value(evaluation, key, measure) for key in run.keys] for evaluation in run.evaluations])
 
 
 def _require_same_world(first: Run, second: Run) -> None:
@@ -90,14 +93,14 @@ def _some(keys: Collection[EpisodeKey]) -> str:
     return f"{len(keys)} scenes and targets ({', '.join(map(str, sorted(keys)[:3]))}, …)"
 
 
-def _mean(run: Run, key: EpisodeKey, measure: str) -> float:
-    return float(np.mean([getattr(evaluation.episodes[key], measure) for evaluation in run.evaluations]))
+def _value(evaluation: Evaluation, key: EpisodeKey, measure: str) -> float:
+    return float(getattr(evaluation.episodes[key], measure))
 
 
 def _difference(column: Column, first: Run, second: Run, rng: np.random.Generator) -> Difference:
-    values = means_by_key(first, column.field), means_by_key(second, column.field)
+    values = values_by_seed(first, column.field), values_by_seed(second, column.field)
     if column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1:
-        before, after = (outcomes == 1.0 for outcomes in values)
+        before, after = (outcomes[0] == 1.0 for outcomes in values)
         both, neither = int(np.sum(before & after)), int(np.sum(~before & ~after))
         first_only, second_only = int(np.sum(before & ~after)), int(np.sum(~before & after))
         return Difference(
@@ -105,4 +108,5 @@ def _difference(column: Column, first: Run, second: Run, rng: np.random.Generato
             difference=newcombe_interval(both, first_only, second_only, neither),
             p_value=mcnemar_exact(first_only, second_only),
         )
-    return Difference(measure=column.key, difference=paired_bootstrap(*values, rng), p_value=None)
+    difference, p_value = difference_over_seeds(*values, rng)
+    return Difference(measure=column.key, difference=difference, p_value=p_value)

@@ -49,8 +49,12 @@ def value_text(column: Column, value: Value) -> str:
 
 def difference_cells(column: Column, change: Difference) -> list[str]:
     """Write a difference and its p-value."""
-    p_value = "-" if change.p_value is None else f"{change.p_value:.3g}"
-    return [interval_text(change.difference, scale=column.scale, sign="+"), p_value]
+    return [interval_text(change.difference, scale=column.scale, sign="+"), p_text(change.p_value)]
+
+
+def p_text(p_value: float | None) -> str:
+    """Write a p-value, if there is one."""
+    return "-" if p_value is None else f"{p_value:.3g}"
 
 
 def interval_text(interval: Interval, *, scale: float = 1.0, sign: str = "", digits: int = 1) -> str:

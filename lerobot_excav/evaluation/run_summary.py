@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from lerobot_excav.envs.tasks.measures import Column, Kind
-from lerobot_excav.evaluation.comparison import matched, means_by_key
+from lerobot_excav.evaluation.comparison import matched, values_by_seed
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
+from lerobot_excav.evaluation.seed_bootstrap import mean_over_seeds, ratio_over_seeds
+from lerobot_excav.evaluation.statistics import Interval, wilson_interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,15 +59,17 @@ def measured(run: Run, operator: Run | None, rng: np.random.Generator) -> dict[s
 
 def _value(column: Column, run: Run, operator: Run | None, rng: np.random.Generator) -> Value:
     if column.kind is Kind.MEAN:
-        return bootstrap_mean(means_by_key(run, column.field), rng)
+        return mean_over_seeds(values_by_seed(run, column.field), rng)
     if column.kind is Kind.RATIO:
         if operator is None:
             return None
-        return bootstrap_ratio(means_by_key(run, column.field), matched(run, operator, column.field), rng)
+        return ratio_over_seeds(values_by_seed(run, column.field), matched(run, operator, column.field), rng)
     outcomes = [getattr(episode, column.field) for episode in run.episodes]
     if column.kind is Kind.COUNTS:
         found = Counter(outcomes)
         return {word: found[word] for word in column.words}
+    if len(run.evaluations) > 1 and None not in outcomes:
+        return mean_over_seeds(values_by_seed(run, column.field), rng)
     return _rate([outcome for outcome in outcomes if outcome is not None], of=len(outcomes))
 
 

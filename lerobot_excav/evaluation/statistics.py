@@ -61,16 +61,6 @@ def bootstrap_ratio(numerator: NDArray[Any], denominator: NDArray[Any], rng: np.
     return _bootstrap(_ratio_of_means, (numerator, denominator), rng)
 
 
-def paired_bootstrap(first: NDArray[Any], second: NDArray[Any], rng: np.random.Generator) -> Interval:
-    """Estimate the mean of `second - first`, paired values, each (n,), with a percentile bootstrap interval.
-
-    Raises:
-        ConfigurationError: Different lengths or no values.
-    """
-    _require_pairs(first, second)
-    return bootstrap_mean(np.asarray(second, float) - np.asarray(first, float), rng)
-
-
 def newcombe_interval(both: int, first_only: int, second_only: int, neither: int) -> Interval:
     """Estimate the difference `second - first` of two success rates on the same scenes with a 95 % score interval.
 

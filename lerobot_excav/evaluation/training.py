@@ -8,6 +8,9 @@ from pydantic import BaseModel, ConfigDict
 from lerobot_excav.datasets.format.validated import validated_file
 from lerobot_excav.evaluation.training_log import read_training_log
 
+FACTS = "training.json"
+"""File of an exported checkpoint in which its `TrainingFacts` are kept."""
+
 
 class TrainingFacts(BaseModel):
     """Facts of a training up to one checkpoint; None where no file tells."""
@@ -57,14 +60,14 @@ class _DatasetInfo(BaseModel):
 def read_training(pretrained: Path) -> TrainingFacts | None:
     """Read how the checkpoint `TRAINING/checkpoints/STEP/pretrained_model` was trained; its log is `TRAINING.log`.
 
-    None if the folder is not a checkpoint of `lerobot-train`, or is gone.
+    An exported checkpoint has kept it. None if the folder is neither, or is gone.
 
     Raises:
         DatasetError: A file of the checkpoint is damaged.
     """
     config = _read(_TrainConfig, pretrained / "train_config.json")
     if config is None:
-        return None
+        return _read(TrainingFacts, pretrained / FACTS)
     folder = pretrained.absolute().parents[2]
     log = read_training_log(folder.with_name(f"{folder.name}.log"))
     step = _read(_Step, pretrained.parent / "training_state" / "training_step.json")

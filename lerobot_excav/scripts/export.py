@@ -1,7 +1,7 @@
 r"""Write a small copy of a trained policy, with a model card: half precision, nothing that only training needs.
 
 The copy of a mask_act checkpoint loads with --policy.path in lerobot-eval, lerobot-rollout and lerobot-train like any
-other.
+other. `training.json` in it says how it was trained, for reports.
 
 Examples:
   lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging
@@ -19,6 +19,7 @@ from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments
 from lerobot_excav.setting import setting
+from lerobot_excav.whole_file import write_whole
 
 
 @dataclass(kw_only=True)
@@ -43,6 +44,7 @@ def run(arguments: ExportArguments) -> int:
     Raises:
         ConfigurationError: The checkpoint is not given, or cannot be exported.
     """
+    from lerobot_excav.evaluation.training import FACTS, read_training
     from lerobot_excav.policies.mask_act.export import export_checkpoint
     from lerobot_excav.policies.mask_act.model_card import CardFacts
 
@@ -58,7 +60,10 @@ def run(arguments: ExportArguments) -> int:
         results=_text(arguments.results) if arguments.results is not None else "",
         license=arguments.license,
     )
+    training = read_training(checkpoint)
     export_checkpoint(checkpoint, out, facts)
+    if training is not None:
+        write_whole(out / FACTS, training.model_dump_json(indent=1) + "\n")
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0

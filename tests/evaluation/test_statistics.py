@@ -107,7 +107,6 @@ SCENES = np.array([100.0, 200.0, 400.0, 150.0])
     [
         (statistics.bootstrap_mean, [np.full(7, 3.0)], 3.0),
         (statistics.bootstrap_ratio, [0.8 * SCENES, SCENES], 0.8),
-        (statistics.paired_bootstrap, [SCENES, SCENES + 5.0], 5.0),
     ],
 )
 def test_what_is_the_same_on_all_scenes_has_no_spread(estimate, values, exact, rng):
@@ -123,7 +122,6 @@ def test_what_is_the_same_on_all_scenes_has_no_spread(estimate, values, exact, r
         lambda rng: statistics.bootstrap_mean(np.array([]), rng),
         lambda rng: statistics.bootstrap_ratio(np.ones(2), np.ones(3), rng),
         lambda rng: statistics.bootstrap_ratio(np.ones(2), np.zeros(2), rng),
-        lambda rng: statistics.paired_bootstrap(np.ones(2), np.ones(3), rng),
         lambda rng: statistics.mcnemar_exact(-1, 2),
         lambda rng: statistics.newcombe_interval(0, 0, 0, 0),
         lambda rng: statistics.newcombe_interval(5, -1, 2, 0),

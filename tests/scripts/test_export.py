@@ -1,8 +1,10 @@
+import json
 from pathlib import Path
 
 import pytest
 
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.training import read_training
 from lerobot_excav.policies.mask_act import export
 from lerobot_excav.policies.mask_act.model_card import CardFacts
 from lerobot_excav.scripts.export import ExportArguments, run
@@ -25,6 +27,18 @@ def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp
     full = CardFacts(title="Grasping", env_type="fr5_grasp", results="98 of 100", license="mit")
     assert asked == [(Path("run"), CardFacts()), (Path("run"), full)]
     assert f"full: 1.0 MB; run it with lerobot-eval --policy.path={tmp_path / 'full'}\n" in capsys.readouterr().out
+
+
+def test_how_it_was_trained_stays_known(monkeypatch, tmp_path):
+    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts: out.mkdir())
+    checkpoint = tmp_path / "train" / "paired" / "checkpoints" / "000400" / "pretrained_model"
+    checkpoint.mkdir(parents=True)
+    config = {"dataset": {"repo_id": "local/x", "episodes": [0, 1, 2]}, "batch_size": 8, "seed": 7}
+    (checkpoint / "train_config.json").write_text(json.dumps(config))
+    assert run(ExportArguments(checkpoint=checkpoint, out=tmp_path / "small")) == 0
+    training = read_training(tmp_path / "small")
+    assert training == read_training(checkpoint)
+    assert (training.name, training.demonstrations, training.seed) == ("paired", 3, 7)
 
 
 @pytest.mark.parametrize("checkpoint", [None, Path("no/such/folder")])

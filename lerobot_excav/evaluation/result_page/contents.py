@@ -48,11 +48,17 @@ class _Table(BaseModel):
 
 
 class Row(_Table):
-    """A row: one evaluation."""
+    """A row: one evaluation, or one for every training seed."""
 
     label: Name  # of its metrics
     about: Text  # the policy, in words
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = ()  # of its trainings; their metrics are called LABEL-SEED
     paper: dict[str, float] = {}  # the paper's figures by key of their column, rates in percent
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its metrics."""
+        return tuple(f"{self.label}-{seed}" for seed in self.seeds) or (self.label,)
 
 
 class Section(_Table):
@@ -62,6 +68,7 @@ class Section(_Table):
     rows: tuple[Row, ...] = ()
     text: str = ""  # what is to be known before
     reference: str | None = None  # label of the row, here or elsewhere, that the others are compared with
+    operator: str | None = None  # label of the row, here or elsewhere, that efficiencies are related to
 
 
 class CurveSource(_Table):
@@ -93,21 +100,25 @@ class Contents(_Table):
         """All rows, section by section."""
         return [row for section in self.section for row in section.rows]
 
-    def metrics_path(self, label: str) -> Path:
-        """Return where the metrics of a row lie: in a folder of its name, or a file."""
-        folder = Path(self.metrics) / label / "metrics.jsonl"
-        return folder if folder.exists() else Path(self.metrics) / f"{label}.jsonl"
+    def metrics_paths(self, row: Row) -> dict[str, Path]:
+        """Return where the metrics of a row lie that are there, by their names: in a folder of that name, or a file."""
+        return {name: path for name in row.names if (path := self._metrics_path(name)).exists()}
+
+    def _metrics_path(self, name: str) -> Path:
+        folder = Path(self.metrics) / name / "metrics.jsonl"
+        return folder if folder.exists() else Path(self.metrics) / f"{name}.jsonl"
 
     @model_validator(mode="after")
     def _names_fit(self) -> "Contents":
-        labels = [row.label for row in self.rows]
+        labels, names = [row.label for row in self.rows], [name for row in self.rows for name in row.names]
         # A page keeps the metrics of a curve by the name of its folder.
         folders = [Path(curve.folder).name for curve in self.curve]
-        if twice := sorted({label for label in labels if labels.count(label) > 1}):
+        if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"{twice} stands on the page twice")
         if twice := sorted({name for name in folders if folders.count(name) > 1}):
             raise ValueError(f"{twice} are the folders of two curves; name each folder once")
         named = [("reference", section.reference) for section in self.section if section.reference is not None]
+        named += [("operator", section.operator) for section in self.section if section.operator is not None]
         named += [("clips of", clips.label) for clips in self.clips]
         for kind, label in named:
             if label not in labels:

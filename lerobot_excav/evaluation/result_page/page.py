@@ -1,6 +1,6 @@
 """A result page in numbers: rows with where they come from, differences and curves."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,27 +8,38 @@ import numpy as np
 from lerobot_excav.envs.tasks.measures import TaskMeasures
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.comparison import Difference, compare, require_same_task
-from lerobot_excav.evaluation.metrics import read_evaluation
+from lerobot_excav.evaluation.metrics import Evaluation, read_evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report import file_notes
 from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
 from lerobot_excav.evaluation.result_page.curves import SuccessCurve, read_curve
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, measured
+from lerobot_excav.evaluation.seed_bootstrap import holm
 from lerobot_excav.evaluation.training import TrainingFacts
 
 
 @dataclass(frozen=True, kw_only=True)
 class PageRow(RunSummary):
-    """A row: what the contents say of it, its numbers, and its command, code and training."""
+    """A row: what the contents say of it, its numbers, and command, code and training of each of its evaluations.
+
+    The evaluations are named as their metrics are.
+    """
 
     row: Row
-    origin: EvaluationOrigin
+    origins: dict[str, EvaluationOrigin]
+
+    @property
+    def parts(self) -> list[tuple[str, Evaluation, EvaluationOrigin]]:
+        """The evaluations, each with its name and where it comes from."""
+        pairs = zip(self.origins.items(), self.run.evaluations, strict=True)
+        return [(name, evaluation, origin) for (name, origin), evaluation in pairs]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the row as plain data."""
         known = {"about": self.row.about, "paper": self.row.paper, "seed": self.run.first.seed}
-        return {**super().as_dict(), **known, "origin": self.origin.model_dump()}
+        origins = {name: origin.model_dump() for name, origin in self.origins.items()}
+        return {**super().as_dict(), **known, "origins": origins}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +88,8 @@ class ResultPage:
     @property
     def trainings(self) -> list[TrainingFacts]:
         """The checkpoints that were evaluated, each once."""
-        trainings = [row.origin.training for row in self.rows if row.origin.training is not None]
+        origins = [origin for row in self.rows for origin in row.origins.values()]
+        trainings = [origin.training for origin in origins if origin.training is not None]
         return list({(training.name, training.steps): training for training in trainings}.values())
 
     @property
@@ -107,7 +119,13 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
             so are the points of a curve.
     """
     rng = np.random.default_rng(seed)
-    rows = {row.label: _row(contents, row, rng) for row in contents.rows if contents.metrics_path(row.label).exists()}
+    runs = {row.label: _run(contents, row) for row in contents.rows if contents.metrics_paths(row)}
+    operators = {row.label: section.operator for section in contents.section for row in section.rows}
+    rows = {
+        row.label: _row(contents, row, runs[row.label], runs.get(operators[row.label] or ""), rng)
+        for row in contents.rows
+        if row.label in runs
+    }
     return ResultPage(
         contents=contents,
         sections=[_section(section, rows, rng) for section in contents.section],
@@ -116,10 +134,14 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
     )
 
 
-def _row(contents: Contents, row: Row, rng: np.random.Generator) -> PageRow:
-    path = contents.metrics_path(row.label)
-    run = Run(label=row.label, evaluations=(read_evaluation(path),))
-    return PageRow(row=row, run=run, values=measured(run, None, rng), origin=EvaluationOrigin.read(path))
+def _run(contents: Contents, row: Row) -> Run:
+    paths = contents.metrics_paths(row).values()
+    return Run(label=row.label, evaluations=tuple(read_evaluation(path) for path in paths))
+
+
+def _row(contents: Contents, row: Row, run: Run, operator: Run | None, rng: np.random.Generator) -> PageRow:
+    origins = {name: EvaluationOrigin.read(path) for name, path in contents.metrics_paths(row).items()}
+    return PageRow(row=row, run=run, values=measured(run, operator, rng), origins=origins)
 
 
 def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
@@ -129,12 +151,17 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
         require_same_task((reference or present[0]).run, row.run)
     if present:
         _require_known_figures(section, present[0].run.measures)
+    others = [row for row in present if reference and row is not reference]
     return PageSection(
         section=section,
         rows=present,
-        missing=[row.label for row in section.rows if row.label not in rows],
-        differences=[_difference(reference.run, row.run, rng) for row in present if reference and row is not reference],
+        missing=[name for row in section.rows for name in row.names if not _has(rows, row, name)],
+        differences=_corrected([_difference(reference.run, row.run, rng) for row in others if reference]),
     )
+
+
+def _has(rows: dict[str, PageRow], row: Row, name: str) -> bool:
+    return row.label in rows and name in rows[row.label].origins
 
 
 def _require_known_figures(section: Section, measures: TaskMeasures) -> None:
@@ -150,3 +177,21 @@ def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDiffe
     common = set(reference.keys) & set(run.keys)
     differences = compare(reference.only(common), run.only(common), rng) if common else []
     return PageDifference(label=run.label, reference=reference.label, scenes=len(common), differences=differences)
+
+
+def _corrected(rows: list[PageDifference]) -> list[PageDifference]:
+    """Correct p-values for the number of rows that are compared with one reference, measure by measure."""
+    compared = [row for row in rows if row.differences]
+    if len(compared) < 2:
+        return rows
+    by_measure = zip(*(row.differences for row in compared), strict=True)
+    columns = [_with_corrected(column) for column in by_measure]
+    corrected = {
+        row.label: list(differences) for row, differences in zip(compared, zip(*columns, strict=True), strict=True)
+    }
+    return [replace(row, differences=corrected.get(row.label, [])) for row in rows]
+
+
+def _with_corrected(column: tuple[Difference, ...]) -> list[Difference]:
+    p_values = holm([difference.p_value for difference in column])
+    return [replace(change, p_corrected=p_value) for change, p_value in zip(column, p_values, strict=True)]

@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.result_page.contents import CURVES
@@ -11,7 +12,6 @@ from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
 from lerobot_excav.evaluation.result_page.video_grid import grid_clips, present_clips, write_grid
-from lerobot_excav.evaluation.run import Run
 from lerobot_excav.whole_file import write_whole
 
 METRICS = "metrics"
@@ -46,14 +46,14 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
 
 def _keep_metrics(page: ResultPage, stage: Path, folder: Path) -> set[str]:
     """Copy what the page is made of; return the names of the copies, seen from the page."""
-    kept: list[tuple[str, Run, EvaluationOrigin]] = [(row.row.label, row.run, row.origin) for row in page.rows]
+    kept: list[tuple[str, Evaluation, EvaluationOrigin]] = [part for row in page.rows for part in row.parts]
     for curve in page.curves:
-        kept += [(f"{CURVES}/{curve.name}/{point.step:06d}", point.run, point.origin) for point in curve.points]
-    for name, run, origin in kept:
-        if run.first.path.resolve() != (folder / f"{name}.jsonl").resolve():
+        kept += [(f"{CURVES}/{curve.name}/{point.step:06d}", point.run.first, point.origin) for point in curve.points]
+    for name, evaluation, origin in kept:
+        if evaluation.path.resolve() != (folder / f"{name}.jsonl").resolve():
             copy = stage / f"{name}.jsonl"
             copy.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(run.first.path, copy)
+            shutil.copyfile(evaluation.path, copy)
             write_whole(stage / f"{name}.json", origin.model_dump_json(indent=1) + "\n")
     return {f"{METRICS}/{name}.{suffix}" for name, *_ in kept for suffix in ("jsonl", "json")}
 

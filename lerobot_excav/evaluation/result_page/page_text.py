@@ -3,7 +3,16 @@
 from collections.abc import Iterator, Sequence
 
 from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
-from lerobot_excav.evaluation.markdown import difference_cells, interval_text, markdown_table, render, value_text
+from lerobot_excav.evaluation.markdown import (
+    difference_cells,
+    interval_text,
+    markdown_table,
+    p_text,
+    render,
+    value_text,
+)
+from lerobot_excav.evaluation.metrics import Evaluation
+from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_text import simulations
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, PageSection, ResultPage
@@ -38,6 +47,7 @@ def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Cl
         measures=_legend(page),
         simulations=simulations([row.run for row in page.rows]) if page.rows else "",
         versions=_versions(page),
+        seeds=sorted({len(row.run.evaluations) for row in page.rows}),
         commands=_commands(page),
         by_hand=_by_hand(page),
     )
@@ -50,12 +60,15 @@ def _tables(section: PageSection) -> Iterator[str]:
     measures = section.rows[0].run.measures
     compared = [measures.column(key) for key in measures.compared]
     yield _table(section.rows, [cell for column in compared for cell in _beside_paper(column, section.rows)])
-    # A page has no operator's run to relate anything to.
-    others = [c for c in measures.columns if c not in compared and c.kind is not Kind.RATIO]
+    others = [
+        column
+        for column in measures.columns
+        if column not in compared and any(row[column.key] is not None for row in section.rows)
+    ]
     yield _table(section.rows, [(_full_header(column), _values(column, section.rows)) for column in others])
     if lines := _differences(section, measures):
         decisive, reference = _decisive(measures).header, section.differences[0].reference
-        header = ["setting", *measures.setting, "scenes", f"{decisive} minus `{reference}`", "p"]
+        header = ["setting", *measures.setting, "scenes", f"{decisive} minus `{reference}`", "p", "p, Holm"]
         yield markdown_table(header, lines)
 
 
@@ -90,6 +103,7 @@ def _differences(section: PageSection, measures: TaskMeasures) -> list[list[str]
             *rows[compared.label].run.setting.values(),
             str(compared.scenes),
             *difference_cells(column, difference),
+            p_text(difference.p_corrected),
         ]
         for compared in section.differences
         for difference in compared.differences
@@ -98,9 +112,8 @@ def _differences(section: PageSection, measures: TaskMeasures) -> list[list[str]
 
 
 def _decisive(measures: TaskMeasures) -> Column:
-    """Return the first rate that is compared."""
-    columns = (measures.column(key) for key in measures.compared)
-    return next(column for column in columns if column.kind is Kind.RATE)
+    """Return the first measure that is compared."""
+    return measures.column(measures.compared[0])
 
 
 def _points(page: ResultPage) -> list[list[str]]:
@@ -143,13 +156,21 @@ def _legend(page: ResultPage) -> list[str]:
     return [
         f"{task}: {line}" if len(tasks) > 1 else line
         for task, measures in tasks.items()
-        for line in measures.legend(None)
+        for line in measures.legend(_operator(page, task))
     ]
 
 
+def _operator(page: ResultPage, task: str) -> str | None:
+    """Return who played in the run that a task's efficiencies are related to; None without one."""
+    named = {section.section.operator for section in page.sections}
+    played = [row.run.first.operator for row in page.rows if row.row.label in named and row.run.task == task]
+    return (played[0] or "not stated") if played else None
+
+
 def _versions(page: ResultPage) -> str:
-    found = {tuple(sorted(row.origin.packages.items())) for row in page.rows if row.origin.packages}
-    return "; or ".join(", ".join(f"{k} {v}" for k, v in packages) for packages in sorted(found))
+    packages = [origin.packages for row in page.rows for origin in row.origins.values() if origin.packages]
+    found = {tuple(sorted(versions.items())) for versions in packages}
+    return "; or ".join(", ".join(f"{k} {v}" for k, v in versions) for versions in sorted(found))
 
 
 def _commands(page: ResultPage) -> list[tuple[str, str]]:
@@ -159,18 +180,20 @@ def _commands(page: ResultPage) -> list[tuple[str, str]]:
         for training in page.trainings
         if training.command
     ]
-    return trainings + [(_heading(row), row.origin.command) for row in page.rows if row.origin.command]
+    parts = [part for row in page.rows for part in row.parts]
+    return trainings + [(_heading(*part), part[2].command) for part in parts if part[2].command]
 
 
-def _heading(row: PageRow) -> str:
-    changed = " and changes" if row.origin.modified else ""
-    commit = f", commit {row.origin.commit[:9]}{changed}" if row.origin.commit else ""
-    return f"{row.row.label}, seed {_number(row.run.first.seed)}{commit}"
+def _heading(name: str, evaluation: Evaluation, origin: EvaluationOrigin) -> str:
+    changed = " and changes" if origin.modified else ""
+    commit = f", commit {origin.commit[:9]}{changed}" if origin.commit else ""
+    return f"{name}, seed {_number(evaluation.seed)}{commit}"
 
 
 def _by_hand(page: ResultPage) -> list[str]:
     """Name what has no known command."""
     trainings = [f"training {training.name}" for training in page.trainings if not training.command]
+    parts = [part for row in page.rows for part in row.parts]
     return trainings + [
-        f"{row.row.label} (seed {_number(row.run.first.seed)})" for row in page.rows if not row.origin.command
+        f"{name} (seed {_number(evaluation.seed)})" for name, evaluation, origin in parts if not origin.command
     ]

@@ -16,6 +16,9 @@ PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
         (f"{SECTION}rows = [{ROW}, {ROW}]", r"\['a'\] stands on the page twice"),
         (f'[[section]]\ntitle = "s"\nreference = "b"\nrows = [{ROW}]', "'b' is not a row; allowed: a"),
         ('[[clips]]\nlabel = "b"\nepisodes = [1]', "'b' is not a row"),
+        (f'[[section]]\ntitle = "s"\noperator = "b"\nrows = [{ROW}]', "operator 'b' is not a row; allowed: a"),
+        (SECTION + 'rows = [{ label = "a", about = "x", seeds = [1, 1] }]', r"\['a-1'\] stands on the page twice"),
+        (SECTION + 'rows = [{ label = "a", about = "x", seeds = [-1] }]', r"seeds\[0\]=-1"),
         ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
         ('[[clips]]\nlabel = "a"\nepisode = [1]', r"clips\[0\]\.episode is not known; allowed: label, episodes"),
         ("[[", "is not TOML"),
@@ -46,9 +49,22 @@ def test_a_file_that_cannot_be_used_says_why(read_rows, text, message):
 
 
 def test_rows_and_figures_are_read_as_their_fields_say(read_rows, tmp_path):
-    contents = read_rows(PAPER % "{ success = 96 }")
-    assert contents.rows[0].paper == {"success": 96.0}
-    assert contents.metrics_path("a") == tmp_path / "test" / "a.jsonl"  # or in a folder, as elsewhere in these tests
+    (row,) = read_rows(PAPER % "{ success = 96 }").rows
+    assert row.paper == {"success": 96.0}
+    assert (row.names, row.seeds) == (("a",), ())
+
+
+def test_metrics_lie_in_a_folder_or_a_file_of_their_name_one_for_each_seed(read_rows, tmp_path):
+    contents = read_rows(SECTION + 'rows = [{ label = "a", about = "x", seeds = [7, 8, 9] }]')
+    for name in ("a-7/metrics.jsonl", "a-8.jsonl", "a-9.jsonl.partial", "a.jsonl"):
+        (tmp_path / "test" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "test" / name).touch()
+    (row,) = contents.rows
+    assert row.names == ("a-7", "a-8", "a-9")
+    assert contents.metrics_paths(row) == {
+        "a-7": tmp_path / "test" / "a-7" / "metrics.jsonl",
+        "a-8": tmp_path / "test" / "a-8.jsonl",
+    }
 
 
 def test_a_file_that_is_not_text_is_named(tmp_path):

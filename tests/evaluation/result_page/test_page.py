@@ -29,8 +29,9 @@ def test_rows_know_where_they_come_from_and_are_compared_with_the_reference_on_c
     (section,) = make_page(finished).sections
     paired, zero = section.rows
     assert (paired["success"].estimate, zero["success"].estimate) == (1.0, 0.0)
-    assert paired.origin.commit.startswith("0123")
-    training = paired.origin.training
+    origin = paired.origins["paired"]
+    assert origin.commit.startswith("0123")
+    training = origin.training
     assert (training.name, training.dataset, training.steps, training.minutes) == ("paired", "pairs", 2000, 20.0)
     assert (training.demonstrations, training.held_out, training.samples) == (200, 40, 32000)
     (difference,) = section.differences
@@ -61,8 +62,8 @@ def test_the_page_is_written_with_data_plot_video_and_metrics(out):
     report = json.loads((out / "report.json").read_text())
     row = report["sections"][0]["rows"][0]
     assert row["paper"] == {"success": 96.0, "episode_return": 658.0}
-    assert row["origin"]["command"].startswith("lerobot-eval")
-    assert row["origin"]["training"]["steps"] == 2000
+    assert row["origins"]["paired"]["command"].startswith("lerobot-eval")
+    assert row["origins"]["paired"]["training"]["steps"] == 2000
     assert report["curves"][0]["points"][0]["minutes"] == 10.0
     lines = [json.loads(line) for line in (out / "rows.jsonl").read_text().splitlines()]
     assert [(line["label"], line["seed"]) for line in lines] == [("paired", 1000), ("zero", 1000)]
@@ -178,7 +179,72 @@ def test_sections_of_different_tasks_are_explained_task_by_task(read_rows):
     assert "target success [%] minus `scoop`" in text
     assert "-100.0 [-100.0, -30.7]" in text
     assert "- FR5Grasp-v0: Placed: " in text
-    assert "efficiency" not in text.lower()  # needs an operator's run, which a page has not
+    assert "efficiency" not in text.lower()  # needs an operator's run, which this page has not
+
+
+SEEDED = """
+[[section]]
+title = "a"
+reference = "mask"
+operator = "operator"
+rows = [
+  { label = "mask", about = "paired", seeds = [1, 2, 3] },
+  { label = "near", about = "non-paired", seeds = [1, 2] },
+  { label = "none", about = "no mask", seeds = [1] },
+  { label = "operator", about = "operator" },
+]
+"""
+
+
+@pytest.fixture
+def seeded(write_evaluation, scoop_line, tmp_path, read_rows):
+    """A page whose trainings have several seeds, some of which were not run yet."""
+    hits = {"mask-1": 19, "mask-2": 20, "near-1": 4, "near-2": 5, "none-1": 8}
+    for name, count in hits.items():
+        lines = [scoop_line(i, target_success=i < count, retained_mass_kg=300.0) for i in range(20)]
+        write_evaluation(f"test/{name}", lines, tmp_path / "gone")
+    lines = [scoop_line(i, retained_mass_kg=400.0, operator="scripted") for i in range(20)]
+    write_evaluation("test/operator", lines, tmp_path / "gone")
+    return read_rows(SEEDED)
+
+
+def test_seeds_of_a_row_are_one_run_and_those_not_run_are_named(seeded):
+    page = make_page(seeded)
+    (section,) = page.sections
+    assert section.missing == ["mask-3"]
+    assert [row.counts["seeds"] for row in section.rows] == [2, 2, 1, 1]
+    mask = section.rows[0]
+    assert (mask.counts["episodes"], mask["target_success"].estimate) == (40, 39 / 40)
+    assert list(mask.origins) == ["mask-1", "mask-2"]
+    text = page_text(page)
+    assert "Training seeds per row: 1 to 2." in text
+    assert "Not run: mask-3." in text
+    assert "# mask-2, seed " in text
+
+
+def test_efficiencies_are_related_to_the_operator_of_the_section(seeded):
+    page = make_page(seeded)
+    assert [row["efficiency"].estimate for row in page.rows] == pytest.approx([0.75, 0.75, 0.75, 1.0])
+    text = page_text(page)
+    assert "| efficiency [%]" in text
+    assert "operator: scripted" in text
+
+
+def test_p_values_are_corrected_for_the_rows_that_are_compared(seeded):
+    (section,) = make_page(seeded).sections
+    near, none, operator = (row.differences[0] for row in section.differences)
+    p_values = sorted((near.p_value, none.p_value, operator.p_value))
+    corrected = sorted((near.p_corrected, none.p_corrected, operator.p_corrected))
+    assert corrected[0] == pytest.approx(3 * p_values[0])
+    assert max(near.p_corrected, none.p_corrected) < 0.01
+    assert operator.p_corrected > 0.05
+
+
+def test_copies_of_several_seeds_make_the_same_page_again(seeded, tmp_path, read_rows):
+    page = make_page(seeded)
+    write_page(page, tmp_path / "results")
+    again = make_page(read_rows(SEEDED, metrics=tmp_path / "results" / "metrics"))
+    assert again.as_dict() == page.as_dict()
 
 
 def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line, write_evaluation):
@@ -190,9 +256,9 @@ def test_the_seed_of_the_bootstrap_has_an_effect(finished, tmp_path, grasp_line,
 
 def test_a_row_may_lack_its_checkpoint_or_any_record(finished, tmp_path, grasp_line, write_evaluation):
     write_evaluation("test/later", [grasp_line(0)], tmp_path / "gone")
-    row = make_page(finished).rows[2]
-    assert row.origin.training is None
-    assert row.origin.command.endswith("--seed=1000")
+    origin = make_page(finished).rows[2].origins["later"]
+    assert origin.training is None
+    assert origin.command.endswith("--seed=1000")
     (tmp_path / "test" / "later" / "metrics.json").unlink()
     assert "Run by hand, without a record of the command: later (seed 0)." in page_text(make_page(finished))
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S, SCOOP
 
 CYCLES = 20
-"""Cycles of an episode at most (kind: tuned on `val` piles with the scripted operator, before any policy was trained: it
-removes 79 % of 50 piles, and 8 of them end before, as nothing is left that is worth a cycle)."""
+"""Cycles of an episode at most (kind: tuned on `val` piles with the scripted operator, before any policy was trained:
+it removes 79 % of 50 piles, and 8 of them end before, as nothing is left that is worth a cycle)."""
 
 LEAST_REMOVED = 0.75
 """Part of the pile that has to be removed for success (kind: design)."""
