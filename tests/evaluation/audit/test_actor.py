@@ -1,0 +1,52 @@
+"""Policies act in an audit as `lerobot-eval` lets them, planning as asked for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.tasks.grasp.spec import GRASP
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.audit.actor import PolicyActor
+
+CHECKPOINT = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
+FRAMES = 8
+
+
+@pytest.fixture(scope="module")
+def env():
+    env = GRASP.make_env(render_mode=None)
+    yield env
+    env.close()
+
+
+def actions(env, *overrides):
+    """Return the first actions in a scene, (FRAMES, 7), and how many plans were made."""
+    actor, plans = PolicyActor(CHECKPOINT, overrides), []
+    plan = actor._policy.predict_action_chunk
+    actor._policy.predict_action_chunk = lambda batch: (plans.append(1), plan(batch))[1]
+    observation, _ = env.reset(seed=0)
+    actor.begin(env)
+    found = []
+    for _ in range(FRAMES):
+        found.append(actor.act(env, observation))
+        observation, *_ = env.step(found[-1])
+    return np.stack(found), len(plans)
+
+
+@pytest.mark.slow
+def test_a_policy_plans_as_its_checkpoint_says_or_as_asked_for(env):
+    usual, plans = actions(env)
+    assert plans == 1
+    assert np.array_equal(actions(env)[0], usual)
+    often, plans = actions(env, "--temporal_ensemble_coeff=null", "--n_action_steps=2")
+    assert plans == FRAMES / 2
+    assert not np.array_equal(often, usual)
+    averaged, plans = actions(env, "--n_action_steps=1", "--temporal_ensemble_coeff=0.01")
+    assert plans == FRAMES
+    assert not np.array_equal(averaged, often)
+
+
+def test_what_is_no_policy_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match="holds no policy"):
+        PolicyActor(tmp_path)
