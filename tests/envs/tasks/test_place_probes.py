@@ -23,7 +23,7 @@ def site():
     return SimpleNamespace(
         worksite=SimpleNamespace(soil=soil, machine=machine),
         target=target,
-        cycle=SimpleNamespace(onset_w=None, **cycle),
+        cycle=SimpleNamespace(onset_w=None),
     )
 
 
