@@ -11,8 +11,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from lerobot_excav.evaluation.result_page.video_grid import read_video
-from lerobot_excav.evaluation.video import write_video
+from lerobot_excav.evaluation.video import read_video, write_video
 
 
 def main() -> int:

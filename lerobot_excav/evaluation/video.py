@@ -1,6 +1,6 @@
-"""Writing videos."""
+"""Writing videos, and reading them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.whole_file import whole_file
 
 Image = NDArray[np.uint8]
@@ -33,3 +34,14 @@ def write_video(path: Path, frames: Iterable[Image], fps: int, *, crf: int) -> N
             even = np.ascontiguousarray(image[:height, :width])
             container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
         container.mux(stream.encode(None))
+
+
+def read_video(path: Path) -> Iterator[Image]:
+    """Yield the pictures of a video, uint8 (H, W, 3).
+
+    Raises:
+        DatasetError: The file is damaged.
+    """
+    with reading(path), av.open(str(path)) as container:
+        for frame in container.decode(video=0):
+            yield frame.to_ndarray(format="rgb24")

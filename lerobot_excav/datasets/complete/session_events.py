@@ -16,6 +16,8 @@ from pydantic import (
     ValidationError,
 )
 
+from lerobot_excav.datasets.format.schema import OPERATORS
+from lerobot_excav.envs.tasks.measures import one_of
 from lerobot_excav.envs.tasks.settings import LAST_SCENE
 from lerobot_excav.errors import DatasetError
 
@@ -73,7 +75,7 @@ class OperatorEvent(_Event):
     """Who commands this episode: the last one that is named."""
 
     event: Literal["operator"]
-    operator: Literal["scripted", "person", "policy"]
+    operator: Annotated[str, one_of(OPERATORS)]
 
 
 class HeldEvent(_Event):

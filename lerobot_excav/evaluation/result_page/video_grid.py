@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +16,7 @@ from lerobot_excav.envs.tasks.measures import EpisodeRecord
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
-from lerobot_excav.evaluation.video import Image, write_video
+from lerobot_excav.evaluation.video import Image, read_video, write_video
 
 logger = logging.getLogger(__name__)
 
@@ -77,17 +77,6 @@ def _clip(row: PageRow, number: int) -> Clip:
             f"{len(played) - 1}"
         )
     return Clip(path=_video(row, number), episode=played[number])
-
-
-def read_video(path: Path) -> Iterator[Image]:
-    """Yield the pictures of a video, uint8 (H, W, 3).
-
-    Raises:
-        DatasetError: The file is damaged.
-    """
-    with reading(path), av.open(str(path)) as container:
-        for frame in container.decode(video=0):
-            yield frame.to_ndarray(format="rgb24")
 
 
 def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:

@@ -1,7 +1,8 @@
 import pytest
 
 from lerobot_excav.evaluation.result_page import video_grid
-from lerobot_excav.evaluation.result_page.video_grid import Clip, read_video, write_grid
+from lerobot_excav.evaluation.result_page.video_grid import Clip, write_grid
+from lerobot_excav.evaluation.video import read_video
 
 from .conftest import write_clip
 
