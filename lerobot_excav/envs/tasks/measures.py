@@ -1,7 +1,7 @@
 """What is measured of a task: the record of an episode, and the columns that sum records up."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
@@ -189,6 +189,8 @@ class TaskMeasures:
         summary: Describes the outcomes of an index in a few words.
         sentence: Says in one sentence what came of episodes; None leaves that to the table.
         figure_entry: Function that draws episodes into a picture file, what no table can show; None draws nothing.
+        method_figures: Functions that draw the episodes of several runs, by their names, into a picture file; each by
+            what the picture shows, in a few words.
     """
 
     record: type[EpisodeRecord]
@@ -204,6 +206,7 @@ class TaskMeasures:
     summary: Callable[["pd.DataFrame"], str]
     sentence: Callable[[Sequence[Any]], str] | None = None
     figure_entry: str | None = None
+    method_figures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def constants(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.result_page.contents import CURVES
+from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
@@ -34,11 +35,12 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     with report.staged() as stage:
         copies = _keep_metrics(page, stage / METRICS, folder / METRICS)
         pictures = _pictures(page, stage)
-        beside = [name for name in (CURVE_PLOT, VIDEO_GRID) if name in pictures or name in report.own]
+        beside = {*pictures, *({CURVE_PLOT, VIDEO_GRID} & set(report.own))}
         text = page_text(page, files=beside, clips=present_clips(page) or None)
         rows = "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows)
         for name, content in zip(TEXTS, (text, json.dumps(page.as_dict(), indent=1) + "\n", rows), strict=True):
             write_whole(stage / name, content)
+    report.remove(lambda name: name.endswith(".png") and name not in beside)
     if Path(page.contents.metrics).resolve() != (folder / METRICS).resolve():  # not made of the copies themselves
         report.remove(lambda name: name.startswith(f"{METRICS}/") and name not in copies)
     return [folder / name for name in (*TEXTS, *pictures)]
@@ -64,4 +66,8 @@ def _pictures(page: ResultPage, folder: Path) -> list[str]:
         plot_curves(page.curves, folder / CURVE_PLOT)
     if clips:
         write_grid(folder / VIDEO_GRID, clips)
-    return [name for name, shown in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if shown]
+    figures = [figure for section in page.sections for figure in method_figures(section)]
+    for figure in figures:
+        figure.draw(folder / figure.name)
+    shown = [name for name, made in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if made]
+    return [*shown, *(figure.name for figure in figures)]

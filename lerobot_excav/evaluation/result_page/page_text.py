@@ -1,6 +1,6 @@
 """A result page in words: Markdown whose tables read well unrendered."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
 from lerobot_excav.evaluation.markdown import (
@@ -15,6 +15,7 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_text import simulations
 from lerobot_excav.evaluation.result_page.contents import Clips
+from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import PageRow, PageSection, ResultPage
 from lerobot_excav.evaluation.training import TrainingFacts
 
@@ -25,7 +26,7 @@ _TRAINING = ("training", "data", "demonstrations", "steps", "batch", "samples", 
 _POINT = ("policy", "played with", "step", "minutes", "n", "success [%]")
 
 
-def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Clips] | None = None) -> str:
+def page_text(page: ResultPage, *, files: Collection[str] = (), clips: Sequence[Clips] | None = None) -> str:
     """Write a page as Markdown.
 
     `files` are the plots and videos that lie beside it; `clips` what the video grid shows, from top to bottom, or None
@@ -34,7 +35,10 @@ def page_text(page: ResultPage, *, files: Sequence[str] = (), clips: Sequence[Cl
     return render(
         "page",
         page=page,
-        sections=[(section, list(_tables(section))) for section in page.sections],
+        sections=[
+            (section, list(_tables(section)), [figure for figure in method_figures(section) if figure.name in files])
+            for section in page.sections
+        ],
         curve_sets=sorted({point.scene_set for curve in page.curves for point in curve.points}),
         curve_header=_POINT,
         curve_rows=_points(page),

@@ -29,13 +29,14 @@ def draw_cut_map(piles: Sequence[ClearRecord], path: Path) -> None:
     piles = piles[:MOST_PILES]
     figure = Figure(figsize=(_PANEL_IN[0] * len(piles), _PANEL_IN[1]), dpi=110, layout="constrained")
     for axes, pile in zip(np.atleast_1d(figure.subplots(1, len(piles))), piles, strict=True):
-        _draw_pile(axes, pile)
+        draw_pile(axes, pile)
     key = "Squares: commanded regions, green where digging began inside; dots: where it began"
     figure.suptitle(key + of, fontsize=9)
     figure.savefig(path, metadata={"Software": None})
 
 
-def _draw_pile(axes: Any, pile: ClearRecord) -> None:
+def draw_pile(axes: Any, pile: ClearRecord) -> None:
+    """Draw the cycles of an episode, seen from above, on matplotlib's `axes`."""
     if _pile_is_known(pile):
         _draw_pile_heights(axes, pile)
     _draw_site(axes)

@@ -209,4 +209,9 @@ CLEAR_MEASURES = TaskMeasures(
     summary=clear_summary,
     sentence=clear_sentence,
     figure_entry="lerobot_excav.envs.tasks.clear.cut_map:draw_cut_map",
+    method_figures={
+        "pile removed over cycles": "lerobot_excav.envs.tasks.clear.method_figures:draw_progress",
+        "what came of the cycles": "lerobot_excav.envs.tasks.clear.method_figures:draw_failures",
+        "where each dug on the same pile": "lerobot_excav.envs.tasks.clear.method_figures:draw_same_pile",
+    },
 )

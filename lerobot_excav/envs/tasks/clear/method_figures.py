@@ -1,0 +1,89 @@
+"""Pictures of several methods that cleared the same piles: how fast, where they dug, and what went wrong."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.tasks.clear.cut_map import draw_pile
+from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, NO_FAILURE
+from lerobot_excav.envs.tasks.clear.measures import ClearRecord
+from lerobot_excav.envs.tasks.clear.spec import CYCLES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Methods = Mapping[str, Sequence[ClearRecord]]
+"""The piles of every method, by its name."""
+
+_DPI = 90
+
+
+def draw_progress(methods: Methods, path: Path) -> None:
+    """Draw the part of the pile that is removed against the number of cycles: the mean, and the middle half of the piles.
+
+    A pile that ends early keeps what it has reached.
+    """
+    figure = _figure(8.0, 4.2)
+    axes = figure.subplots()
+    for name, piles in methods.items():
+        removed = 100.0 * np.array([removed_by_cycle(pile) for pile in piles])
+        (line,) = axes.plot(removed.mean(axis=0), marker=".", label=f"{name} (n = {len(piles)})")
+        low, high = np.percentile(removed, [25.0, 75.0], axis=0)
+        axes.fill_between(range(CYCLES + 1), low, high, color=line.get_color(), alpha=0.15, linewidth=0.0)
+    axes.set(xlabel="cycles", ylabel="pile removed [%]", xlim=(0, CYCLES), ylim=(0, 100))
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    figure.savefig(path, metadata={"Software": None})
+
+
+def removed_by_cycle(pile: ClearRecord) -> NDArray[np.float64]:
+    """Return the removed part after 0 to `CYCLES` cycles (CYCLES + 1,)."""
+    removed = [0.0, *(cycle.pile_removed for cycle in pile.cycles[:CYCLES])]
+    return np.array(removed + [removed[-1]] * (CYCLES + 1 - len(removed)))
+
+
+def draw_failures(methods: Methods, path: Path) -> None:
+    """Draw what came of the cycles, a bar for every method."""
+    figure = _figure(8.0, 0.9 + 0.45 * len(methods))
+    axes = figure.subplots()
+    kinds = (NO_FAILURE, *FAILURES)
+    shares = 100.0 * np.array([failure_shares(piles) for piles in methods.values()])
+    starts = np.cumsum(shares, axis=1) - shares
+    for kind, start, share in zip(kinds, starts.T, shares.T, strict=True):
+        label = "as commanded" if kind == NO_FAILURE else kind
+        axes.barh(list(methods), share, left=start, label=label)
+    axes.invert_yaxis()
+    axes.set(xlabel="cycles [%]", xlim=(0, 100))
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=4)
+    figure.savefig(path, metadata={"Software": None})
+
+
+def failure_shares(piles: Sequence[ClearRecord]) -> list[float]:
+    """Return which part of the cycles went as commanded, and which failed in each of the ways of `FAILURES`."""
+    counts = Counter(cycle.failure for pile in piles for cycle in pile.cycles)
+    return [counts[kind] / max(counts.total(), 1) for kind in (NO_FAILURE, *FAILURES)]
+
+
+def draw_same_pile(methods: Methods, path: Path) -> None:
+    """Draw where every method dug on the first pile that all of them have cleared; nothing if there is none."""
+    shared = set.intersection(*({pile.key for pile in piles} for piles in methods.values()))
+    figure = _figure(4.2 * len(methods), 4.6)
+    if not shared:
+        figure.text(0.5, 0.5, "No pile was cleared by all of them.", ha="center")
+    else:
+        panels = figure.subplots(1, len(methods), squeeze=False)[0]
+        for axes, (name, piles) in zip(panels, methods.items(), strict=True):
+            draw_pile(axes, next(pile for pile in piles if pile.key == min(shared)))
+            axes.set_title(f"{name}\n{axes.get_title()}", fontsize=8)
+    figure.savefig(path, metadata={"Software": None})
+
+
+def _figure(width_in: float, height_in: float) -> "Figure":
+    # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), dpi=_DPI, layout="constrained")

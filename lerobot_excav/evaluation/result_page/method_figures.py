@@ -1,0 +1,46 @@
+"""Pictures that set the rows of a section beside each other, where their task has such pictures."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+
+from lerobot_excav.evaluation.result_page.page import PageSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodFigure:
+    """A picture of a section.
+
+    Attributes:
+        name: Name of its file.
+        about: What it shows, in a few words.
+        entry: Function that draws it.
+        section: The section.
+    """
+
+    name: str
+    about: str
+    entry: str
+    section: PageSection
+
+    def draw(self, path: Path) -> None:
+        """Draw it into a file."""
+        resolve_name(self.entry)({row.row.about: row.run.episodes for row in self.section.rows}, path)
+
+
+def method_figures(section: PageSection) -> list[MethodFigure]:
+    """Return the pictures of a section: none unless two rows of it have been run."""
+    if len(section.rows) < 2:
+        return []
+    figures = section.rows[0].run.measures.method_figures
+    return [
+        MethodFigure(
+            name=f"{_slug(section.section.title)}_{_slug(about)}.png", about=about, entry=entry, section=section
+        )
+        for about, entry in figures.items()
+    ]
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
