@@ -23,7 +23,7 @@ _DPI = 90
 
 
 def draw_progress(methods: Methods, path: Path) -> None:
-    """Draw the part of the pile that is removed against the number of cycles: the mean, and the middle half of the piles.
+    """Draw the part of the pile that is removed over the cycles: the mean, and the middle half of the piles.
 
     A pile that ends early keeps what it has reached.
     """
