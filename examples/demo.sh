@@ -10,15 +10,15 @@ source "$(dirname "$0")/own_folder.sh"
 require_checkpoint "$CHECKPOINT"
 
 say "Clearing the pile of test scene $SCENE -> $OUT"
-rm -rf "$OUT/play" "$OUT/metrics.jsonl"
+rm -rf "$OUT/play" "$OUT/film" "$OUT/metrics.jsonl"
 lerobot-eval --policy.path="$CHECKPOINT" --policy.device=cpu \
   --env.type=excavator --env.task=Clear-v0 --env.scene_set=test --seed="$SCENE" \
-  --env.render_camera=overview_with_side --env.render_every="$EVERY" --env.metrics_path="$OUT/metrics.jsonl" \
+  --env.film_folder="$OUT/film" --env.film_every="$EVERY" --env.render_camera=overview_with_side \
+  --env.render_height=96 --env.render_width=128 --env.render_every="$EVERY" --env.metrics_path="$OUT/metrics.jsonl" \
   --eval.n_episodes=1 --eval.batch_size=1 --output_dir="$OUT/play"
 
 say "Result"
 lerobot-excav report "$OUT/metrics.jsonl" --out="$OUT/report"
-python examples/time_lapse.py "$(find "$OUT/play" -name '*.mp4')" "$OUT/clearing.mp4" --every="$EVERY"
-echo "video:  $OUT/clearing.mp4"
+echo "video:  $(find "$OUT/film" -name '*.mp4')"
 echo "map:    $(find "$OUT/report" -name 'figure_*.png')"
 echo "table:  $OUT/report/report.md"

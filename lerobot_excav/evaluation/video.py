@@ -1,7 +1,6 @@
 """Writing videos, and reading them."""
 
 from collections.abc import Iterable, Iterator
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -9,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.reading import reading
-from lerobot_excav.whole_file import whole_file
+from lerobot_excav.envs.tasks.video_file import VideoFile
 
 Image = NDArray[np.uint8]
 
@@ -23,17 +22,14 @@ def write_video(path: Path, frames: Iterable[Image], fps: int, *, crf: int) -> N
         fps: Pictures per second.
         crf: Constant rate factor of x264: 18 is lossless to the eye, 28 coarse.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as temporary, av.open(str(temporary), mode="w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(fps))
-        stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": str(crf), "preset": "slow"}
+    video = VideoFile(path, fps, crf=crf)
+    try:
         for image in frames:
-            height, width = (size - size % 2 for size in image.shape[:2])
-            stream.height, stream.width = height, width
-            even = np.ascontiguousarray(image[:height, :width])
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
-        container.mux(stream.encode(None))
+            video.add(image)
+        video.finish()
+    except BaseException:
+        video.discard()
+        raise
 
 
 def read_video(path: Path) -> Iterator[Image]:

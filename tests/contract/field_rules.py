@@ -222,6 +222,9 @@ ENV = {
     "render_mode": optional(one_of("rgb_array")),
     **dict.fromkeys(("render_height", "render_width"), whole(32, 1024)),
     "render_every": whole(1, 1000),
+    "film_folder": optional(text),
+    "film_every": whole(1, 1000).beside(film_folder="films"),
+    **dict.fromkeys(("film_height", "film_width"), whole(32, 1024).beside(film_folder="films")),
     "max_parallel_tasks": whole(1, 1),
     "disable_env_checker": flag,
 }

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.selection import Selection
 from lerobot_excav.errors import require
 from toy_reach.spec import ReachSettings
 from toy_reach.table import SPOT_RADIUS_M, Table, TableRenderer, draw_spots
@@ -30,9 +31,9 @@ class ReachEnv(MaskedTaskEnv[Table, TableRenderer]):
     def _make_view(self, height: int, width: int) -> TableRenderer:
         return TableRenderer(self.world, height=height, width=width)
 
-    def _start(self, scene_id: int, target_id: int) -> None:
-        self.world.reset(draw_spots(self.settings.scene_set, scene_id))
-        self._target, self._on_target = target_id, 0
+    def _start(self, selection: Selection) -> None:
+        self.world.reset(draw_spots(self.settings.scene_set, selection.scene_id))
+        self._target, self._on_target = selection.target_id, 0
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
         action = np.asarray(action, np.float64)

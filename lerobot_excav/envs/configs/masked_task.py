@@ -66,6 +66,7 @@ class MaskedTaskEnvConfig(RenderSettings, EnvConfig):  # type: ignore[misc]  # L
             f"env.metrics_episodes={self.metrics_episodes} has no effect without a file; "
             "give --env.metrics_path as well.",
         )
+        self.require_film_effect("env.")
         require_choice("env.render_camera", self.render_camera, self.task_spec.views)
         self._derive_features()
 

@@ -111,8 +111,8 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         """Make the renderer of the world."""
 
     @abstractmethod
-    def _start(self, scene_id: int, target_id: int) -> None:
-        """Reset the world to a scene, and begin the task on one of its targets."""
+    def _start(self, selection: Selection) -> None:
+        """Reset the world to a scene, and begin the task on one of its targets; until then there is no episode."""
 
     @abstractmethod
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
@@ -235,16 +235,14 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         super().reset(seed=seed)
         self._selection = self._picture = None  # until the start has succeeded
         rng, length = self.np_random, self.episode_length
-        selection = self._selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
-        try:
-            self._start(selection.scene_id, selection.target_id)
-        except BaseException:
-            self._selection = None  # so that a step says that there is no episode
-            raise
+        selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
+        self._start(selection)
+        self._selection = selection
         self._frame = self._missing_frames = 0
         self._commands, self._main_img, self._is_over = [], None, False
         self._give_command(selection.target_id)
         self._wait_for_mask()
+        self._begin_film(f"{self.task}_{self.settings.scene_set}_{self.scene_id}_{self.stage}_{self.target_id}")
         return self._observe(), self._info(is_over=False)
 
     def step(self, action: NDArray[Any]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -266,11 +264,12 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         frames = self._frame + self._missing_frames
         truncated = (self.mask_missing or frames >= self.episode_length) and not terminated
         self._is_over = terminated or truncated
+        self._add_to_film()
         return self._observe(), float(reward), terminated, truncated, self._info(is_over=self._is_over)
 
     def close(self) -> None:
         """Free the graphics contexts."""
-        self._close_view()
+        self._close_views()
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = self._main_img = None

@@ -44,9 +44,37 @@ class RenderSettings:
         low=1,
         high=1000,
     )
+    film_folder: str | None = setting(
+        "Folder in which the environment itself writes a film of every episode that comes to its end, the last picture "
+        "included; left out: none. It needs little memory, where LeRobot keeps all pictures of an episode",
+        default=None,
+    )
+    film_height: int = setting("Height of these films [px]", default=480, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX)
+    film_width: int = setting("Width of these films [px]", default=640, low=_LEAST_IMAGE_PX, high=_MOST_IMAGE_PX)
+    film_every: int = setting(
+        "Frames from one picture of these films to the next: with 10 a film is a time lapse, ten times as fast",
+        default=1,
+        low=1,
+        high=1000,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)
+        self.require_film_effect()
+
+    def require_film_effect(self, prefix: str = "") -> None:
+        """Check that what is said of films is said of some.
+
+        Raises:
+            ConfigurationError: A setting of films is given, and no folder for them.
+        """
+        plain = {field.name: field.default for field in dataclasses.fields(RenderSettings)}
+        for name in ("film_height", "film_width", "film_every"):
+            value = getattr(self, name)
+            require(
+                self.film_folder is not None or value == plain[name],
+                f"{prefix}{name}={value} has no effect without a folder; give {prefix}film_folder as well",
+            )
 
 
 @dataclass(kw_only=True)

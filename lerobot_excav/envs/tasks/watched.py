@@ -1,6 +1,7 @@
 """What a person sees of an episode: `render()`, hence LeRobot's videos of evaluations."""
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.view import View
 from lerobot_excav.envs.masks.source import TargetMask
 from lerobot_excav.envs.tasks.caption import Caption, captioned
+from lerobot_excav.envs.tasks.film import Film
 from lerobot_excav.envs.tasks.settings import RenderSettings, TaskSettings
 
 
@@ -24,6 +26,8 @@ class WatchedEnv(ABC):
 
     _is_over = False
     _view: View | None = None
+    _film_view: View | None = None
+    _film: Film | None = None
     _picture: NDArray[np.uint8] | None = None
     _drawn = (False, 0)  # whether the episode was over when the picture was drawn, and its frame
 
@@ -83,18 +87,40 @@ class WatchedEnv(ABC):
         every, drawn = self.render_settings.render_every, (self._is_over, round(self.time_s * self.settings.fps))
         is_end = self._is_over and drawn != self._drawn
         if self._picture is None or is_end or every == 1 or drawn[1] - self._drawn[1] >= every:
-            self._picture, self._drawn = self._draw_for_people(), drawn
+            if self._view is None:
+                self._view = self._make_view(self.render_settings.render_height, self.render_settings.render_width)
+            self._picture, self._drawn = self._draw_for_people(self._view), drawn
         return self._picture.copy()
 
-    def _draw_for_people(self) -> NDArray[np.uint8]:
-        settings = self.render_settings
-        if self._view is None:
-            self._view = self._make_view(settings.render_height, settings.render_width)
+    def _draw_for_people(self, view: View) -> NDArray[np.uint8]:
         other = self._other_target_shown()
-        self._view.mark(
-            self._visible_target(self.target_id), shown=None if other is None else self._visible_target(other)
-        )
-        return captioned(self._view.render(settings.render_camera), self._caption())
+        view.mark(self._visible_target(self.target_id), shown=None if other is None else self._visible_target(other))
+        return captioned(view.render(self.render_settings.render_camera), self._caption())
+
+    def _begin_film(self, name: str) -> None:
+        """Begin the film of an episode, if films are wanted.
+
+        Raises:
+            ConfigurationError: There is a film of this name.
+        """
+        if (folder := self.render_settings.film_folder) is None:
+            return
+        self._film = self._film or Film(Path(folder), self.settings.fps)
+        self._film.begin(name)
+        self._add_to_film()
+
+    def _add_to_film(self) -> None:
+        """Add the present picture to the film if its turn has come; the end of the episode is its end."""
+        settings = self.render_settings
+        if self._film is None or not (
+            self._is_over or round(self.time_s * self.settings.fps) % settings.film_every == 0
+        ):
+            return
+        if self._film_view is None:
+            self._film_view = self._make_view(settings.film_height, settings.film_width)
+        self._film.add(self._draw_for_people(self._film_view))
+        if self._is_over:
+            self._film.end()
 
     def _other_target_shown(self) -> int | None:
         """Return the target that the mask shows, unless it is the commanded one or none that the source could name."""
@@ -107,8 +133,11 @@ class WatchedEnv(ABC):
             return Caption(words=words, outcome="success", is_success=True)
         return Caption(words=words, outcome=self._failure(), is_success=False)
 
-    def _close_view(self) -> None:
-        """Free the graphics context of the view."""
-        if self._view is not None:
-            self._view.close()
-            self._view = self._picture = None
+    def _close_views(self) -> None:
+        """Free the graphics contexts of the views; the film of an episode that has not come to its end is left out."""
+        if self._film is not None:
+            self._film.leave_out()
+        for view in (self._view, self._film_view):
+            if view is not None:
+                view.close()
+        self._view = self._film_view = self._picture = None

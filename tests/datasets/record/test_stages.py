@@ -48,10 +48,10 @@ def offer(monkeypatch, targets_at):
     """Let the starts at some stages offer fewer targets."""
     start = toy_reach.env.ReachEnv._start
 
-    def limited(env, scene_id, target_id):
-        if target_id >= targets_at.get(env.stage, 4):
+    def limited(env, selection):
+        if selection.target_id >= targets_at.get(selection.stage, 4):
             raise TargetAbsentError("there is none")
-        start(env, scene_id, target_id)
+        start(env, selection)
 
     monkeypatch.setattr(toy_reach.env.ReachEnv, "_start", limited)
 

@@ -16,8 +16,7 @@ from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.scene import Scene
-from lerobot_excav.envs.tasks.scoop.stage import draw_start
-from lerobot_excav.envs.tasks.selection import TargetAbsentError
+from lerobot_excav.envs.tasks.selection import Selection, TargetAbsentError
 from lerobot_excav.errors import ConfigurationError, require
 
 PLANNER_PICTURE_PX = (192, 256)
@@ -69,20 +68,18 @@ class ClearEnv(ExcavatorEnv):
         return self._clearing
 
     @override
-    def _start(self, scene_id: int, target_id: int) -> None:
-        settings = self._excavator_settings
-        self._scene = draw_start(
-            settings.scene_set, scene_id, self.stage, soil=settings.soil, fidelity=settings.fidelity
-        )
+    def _start(self, selection: Selection) -> None:
+        self._scene = self._draw_start(selection)
         self.worksite.reset(self._scene)
         self._clearing = Clearing(self.worksite)
         self._look()
         if self.plan.nothing_left is not None:
-            raise (TargetAbsentError if self.stage and not settings.zones else ConfigurationError)(
-                f"scene_id={scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another scene, or other "
-                f"zones than keep_out={settings.keep_out!r}"
+            settings = self._excavator_settings
+            raise (TargetAbsentError if selection.stage and not settings.zones else ConfigurationError)(
+                f"scene_id={selection.scene_id}: there is nothing to dig: {self.plan.nothing_left}; take another "
+                f"scene, or other zones than keep_out={settings.keep_out!r}"
             )
-        self._begin_cycle(target_id)
+        self._begin_cycle(selection.target_id)
 
     @override
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:

@@ -15,6 +15,7 @@ from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
 from lerobot_excav.envs.tasks.grasp.settings import FR5Settings
 from lerobot_excav.envs.tasks.grasp.task import GraspTask
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.selection import Selection
 
 _RETARGET_STREAM = 0x4E77  # names the random streams from which the second target is drawn
 
@@ -91,10 +92,10 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
             return None
         return "wrong block" if self.grasp.has_wrong_block else "not in the tray"
 
-    def _start(self, scene_id: int, target_id: int) -> None:
-        scene = draw_scene(self.settings.scene_set, scene_id)
+    def _start(self, selection: Selection) -> None:
+        scene = draw_scene(self.settings.scene_set, selection.scene_id)
         self.workcell.reset(scene)
-        self._scene, self._grasp = scene, GraspTask(self.workcell, target_id)
+        self._scene, self._grasp = scene, GraspTask(self.workcell, selection.target_id)
         self._start_pixels: NDArray[np.bool_] | None = None
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:

@@ -20,7 +20,7 @@ from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
 from lerobot_excav.envs.tasks.scoop.targets import Target
-from lerobot_excav.envs.tasks.selection import TargetAbsentError
+from lerobot_excav.envs.tasks.selection import Selection, TargetAbsentError
 from lerobot_excav.errors import require
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
@@ -115,16 +115,22 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     def _failure(self) -> str | None:
         return self.cycle.failure or ("not emptied in time" if self.is_over and not self.is_success else None)
 
-    def _start(self, scene_id: int, target_id: int) -> None:
-        settings = self._excavator_settings
-        scene = draw_start(settings.scene_set, scene_id, self.stage, soil=settings.soil, fidelity=settings.fidelity)
-        if target_id >= (count := len(scene.targets)):
+    def _start(self, selection: Selection) -> None:
+        scene = self._draw_start(selection)
+        if selection.target_id >= (count := len(scene.targets)):
             raise TargetAbsentError(
-                f"target_id={target_id} is not possible: scene {scene_id} has {count} regions at stage {self.stage}; "
-                "give a lower number, or an earlier stage"
+                f"target_id={selection.target_id} is not possible: scene {selection.scene_id} has {count} regions at "
+                f"stage {selection.stage}; give a lower number, or an earlier stage"
             )
         self.worksite.reset(scene)
-        self._cycle = DigCycle(self.worksite, scene, target_id)
+        self._cycle = DigCycle(self.worksite, scene, selection.target_id)
+
+    def _draw_start(self, selection: Selection) -> Scene:
+        """Return the scene as it is at the chosen stage."""
+        settings = self._excavator_settings
+        return draw_start(
+            *(settings.scene_set, selection.scene_id, selection.stage), soil=settings.soil, fidelity=settings.fidelity
+        )
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
         command, cycle = checked_action(action), self.cycle
