@@ -1,7 +1,6 @@
 """Make a time lapse of a video: every n-th picture of it, as mp4 or, small enough for a README, as an animated WebP.
 
-python examples/time_lapse.py outputs/demo/play/videos/excavator_0/eval_episode_0.mp4 clearing.mp4 --every=10
-python examples/time_lapse.py … clearing.webp --every=20 --width=480
+python examples/time_lapse.py outputs/demo/film/Clear-v0_test_0_0_0.mp4 docs/images/clearing.webp --every=2 --width=480
 """
 
 import argparse

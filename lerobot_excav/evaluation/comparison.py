@@ -1,7 +1,7 @@
 """Two runs on the same scenes and targets, compared pair by pair."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.measures import Column, EpisodeKey, Kind
 from lerobot_excav.errors import DatasetError, require
+from lerobot_excav.evaluation.crossed_effects import difference_over_seeds
 from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.seed_bootstrap import difference_over_seeds
 from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, newcombe_interval
 
 
@@ -22,8 +22,8 @@ class Difference:
     Attributes:
         measure: Key of its column.
         difference: Second minus first, over scenes and targets; of rates with single seeds with Newcombe's interval,
-            else with that of a bootstrap over seeds and scenes.
-        p_value: McNemar's exact test where the interval is Newcombe's, else that of the bootstrap.
+            else with that of `crossed_effects`, over seeds and scenes.
+        p_value: McNemar's exact test where the interval is Newcombe's, else that of `crossed_effects`.
         p_corrected: Corrected for the number of rows that are compared with one reference; None where only one is.
     """
 
@@ -33,7 +33,7 @@ class Difference:
     p_corrected: float | None = None
 
 
-def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Difference]:
+def compare(first: Run, second: Run) -> list[Difference]:
     """Compare a second run with a first, its reference.
 
     Raises:
@@ -45,7 +45,7 @@ def compare(first: Run, second: Run, rng: np.random.Generator) -> list[Differenc
             f"{first.label} and {second.label} differ in {_some(missing)}, so they "
             "cannot be compared pairwise; evaluate both with the same --seed and --eval.n_episodes"
         )
-    return [_difference(first.measures.column(key), first, second, rng) for key in first.measures.compared]
+    return [_difference(first.measures.column(key), first, second) for key in first.measures.compared]
 
 
 def matched(run: Run, reference: Run, measure: str) -> NDArray[Any]:
@@ -75,7 +75,7 @@ def difference_of_worlds(first: Run, second: Run) -> str:
     if first.world == second.world:
         return ""
     played = " and ".join(f"{run.label} {run.world}" for run in (first, second))
-    return f"{played}, where a number means another scene"
+    return f"{played}, so the same numbers are not the same scenes under the same conditions"
 
 
 def values_by_seed(run: Run, measure: str) -> NDArray[np.float64]:
@@ -97,16 +97,23 @@ def _value(evaluation: Evaluation, key: EpisodeKey, measure: str) -> float:
     return float(getattr(evaluation.episodes[key], measure))
 
 
-def _difference(column: Column, first: Run, second: Run, rng: np.random.Generator) -> Difference:
+def _difference(column: Column, first: Run, second: Run) -> Difference:
     values = values_by_seed(first, column.field), values_by_seed(second, column.field)
     if column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1:
-        before, after = (outcomes[0] == 1.0 for outcomes in values)
-        both, neither = int(np.sum(before & after)), int(np.sum(~before & ~after))
-        first_only, second_only = int(np.sum(before & ~after)), int(np.sum(~before & after))
-        return Difference(
-            measure=column.key,
-            difference=newcombe_interval(both, first_only, second_only, neither),
-            p_value=mcnemar_exact(first_only, second_only),
-        )
-    difference, p_value = difference_over_seeds(*values, rng)
+        difference, p_value = _paired_rates(values[0][0] == 1.0, values[1][0] == 1.0)
+    else:
+        difference, p_value = difference_over_seeds(*values)
+    if column.kind is Kind.RATE and max(map(len, values)) > 1:
+        # Where all episodes end alike nothing varies, and still they might have ended otherwise.
+        least, least_p = _paired_rates(*(outcomes.mean(axis=0) > 0.5 for outcomes in values))
+        low, high = min(difference.low, least.low), max(difference.high, least.high)
+        difference = replace(difference, low=max(-1.0, low), high=min(1.0, high))
+        p_value = max(p_value, least_p)
     return Difference(measure=column.key, difference=difference, p_value=p_value)
+
+
+def _paired_rates(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[Interval, float]:
+    """Return the difference of two rates on the same scenes, and the p-value of equal ones."""
+    first_only, second_only = int(np.sum(before & ~after)), int(np.sum(~before & after))
+    both, neither = int(np.sum(before & after)), int(np.sum(~before & ~after))
+    return newcombe_interval(both, first_only, second_only, neither), mcnemar_exact(first_only, second_only)

@@ -59,7 +59,7 @@ def make_report(runs: list[Run], *, operator: Run | None = None, seed: int = 0) 
     return Report(
         runs=[RunSummary(run=run, values=measured(run, operator, rng)) for run in rows],
         differences={
-            f"{run.label} - {runs[0].label}": compare(runs[0], run, rng) for run in runs[1:] if not unlike[run.label]
+            f"{run.label} - {runs[0].label}": compare(runs[0], run) for run in runs[1:] if not unlike[run.label]
         },
         operator=(operator.first.operator or "not stated") if operator else None,
         bootstrap_seed=seed,

@@ -8,9 +8,9 @@ import numpy as np
 
 from lerobot_excav.envs.tasks.measures import Column, Kind
 from lerobot_excav.evaluation.comparison import matched, values_by_seed
+from lerobot_excav.evaluation.crossed_effects import mean_over_seeds, ratio_over_seeds
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.seed_bootstrap import mean_over_seeds, ratio_over_seeds
-from lerobot_excav.evaluation.statistics import Interval, wilson_interval
+from lerobot_excav.evaluation.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson_interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,23 +58,33 @@ def measured(run: Run, operator: Run | None, rng: np.random.Generator) -> dict[s
 
 
 def _value(column: Column, run: Run, operator: Run | None, rng: np.random.Generator) -> Value:
-    if column.kind is Kind.MEAN:
-        return mean_over_seeds(values_by_seed(run, column.field), rng)
-    if column.kind is Kind.RATIO:
-        if operator is None:
-            return None
-        return ratio_over_seeds(values_by_seed(run, column.field), matched(run, operator, column.field), rng)
-    outcomes = [getattr(episode, column.field) for episode in run.episodes]
     if column.kind is Kind.COUNTS:
-        found = Counter(outcomes)
+        found = Counter(getattr(episode, column.field) for episode in run.episodes)
         return {word: found[word] for word in column.words}
-    if len(run.evaluations) > 1 and None not in outcomes:
-        return mean_over_seeds(values_by_seed(run, column.field), rng)
-    return _rate([outcome for outcome in outcomes if outcome is not None], of=len(outcomes))
-
-
-def _rate(outcomes: list[bool], *, of: int) -> Interval | None:
-    if not outcomes:
+    if column.kind is Kind.RATE:
+        return _rate(column, run)
+    if column.kind is Kind.RATIO and operator is None:
         return None
-    rate = wilson_interval(sum(outcomes), len(outcomes))
-    return rate if len(outcomes) == of else RateOf(**asdict(rate), n=len(outcomes))
+    values = values_by_seed(run, column.field)
+    if operator is None or column.kind is Kind.MEAN:
+        return mean_over_seeds(values) if len(values) > 1 else bootstrap_mean(values[0], rng)
+    theirs = matched(run, operator, column.field)
+    return ratio_over_seeds(values, theirs) if len(values) > 1 else bootstrap_ratio(values[0], theirs, rng)
+
+
+def _rate(column: Column, run: Run) -> Interval | None:
+    """Return a rate; of episodes that all say something, and several seeds, with an interval over both.
+
+    That is no narrower than Wilson's over the scenes: where all episodes end alike, they still may not have.
+    """
+    outcomes = [getattr(episode, column.field) for episode in run.episodes]
+    known = [outcome for outcome in outcomes if outcome is not None]
+    if not known:
+        return None
+    if len(run.evaluations) == 1 or len(known) < len(outcomes):
+        rate = wilson_interval(sum(known), len(known))
+        return rate if len(known) == len(outcomes) else RateOf(**asdict(rate), n=len(known))
+    crossed = mean_over_seeds(values_by_seed(run, column.field))
+    least = wilson_interval(round(crossed.estimate * len(run.keys)), len(run.keys))
+    low, high = min(crossed.low, least.low), max(crossed.high, least.high)
+    return Interval(estimate=crossed.estimate, low=max(0.0, low), high=min(1.0, high))

@@ -1,7 +1,8 @@
 r"""Write a small copy of a trained policy, with a model card: half precision, nothing that only training needs.
 
 The copy of a mask_act checkpoint loads with --policy.path in lerobot-eval, lerobot-rollout and lerobot-train like any
-other. `training.json` in it says how it was trained, for reports.
+other. `training.json` in it says how it was trained, for reports: steps, seed, time, and the command if the log of a
+workflow tells.
 
 Examples:
   lerobot-excav export outputs/train/checkpoints/last/pretrained_model --out=checkpoints/digging
@@ -19,7 +20,6 @@ from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments
 from lerobot_excav.setting import setting
-from lerobot_excav.whole_file import write_whole
 
 
 @dataclass(kw_only=True)
@@ -61,9 +61,8 @@ def run(arguments: ExportArguments) -> int:
         license=arguments.license,
     )
     training = read_training(checkpoint)
-    export_checkpoint(checkpoint, out, facts)
-    if training is not None:
-        write_whole(out / FACTS, training.model_dump_json(indent=1) + "\n")
+    beside = {} if training is None else {FACTS: training.model_dump_json(indent=1) + "\n"}
+    export_checkpoint(checkpoint, out, facts, beside=beside)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {size / 1e6:.1f} MB; run it with lerobot-eval --policy.path={out}")
     return 0

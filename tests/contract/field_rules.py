@@ -232,7 +232,7 @@ LEROBOTS_OWN = ("id", "calibration_dir")
 ROBOT = {
     "scene_id": whole(0, ENDLESS),
     "target_id": whole(0, 3),
-    "stage": whole(0, 15),
+    "stage": whole(0, 19),
     "advance": one_of("episode", "button"),
     "session_log": optional(path),
     "depth": flag,

@@ -79,9 +79,19 @@ def test_an_episode_that_does_not_come_to_its_end_leaves_no_film(make, tmp_path)
 
 def test_a_film_of_the_same_episode_is_not_replaced(make, tmp_path):
     env = play(make())
+    (first,) = films(tmp_path)
+    before = first.read_bytes()
+    play(env)
+    play(env)
+    names = [path.stem for path in films(tmp_path)]
+    assert names == [first.stem, f"{first.stem}_2", f"{first.stem}_3"]
+    assert first.read_bytes() == before
+
+
+def test_a_frame_after_the_end_is_not_filmed(make, tmp_path):
+    env = play(make())
     before = films(tmp_path)[0].read_bytes()
-    with pytest.raises(ConfigurationError, match=r"_2_0_\d\.mp4 exists; choose another film_folder"):
-        play(env)
+    env.step(env.holding_action())
     assert [path.read_bytes() for path in films(tmp_path)] == [before]
 
 

@@ -13,7 +13,7 @@ from lerobot_excav.scripts.export import ExportArguments, run
 def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp_path, capsys):
     asked = []
 
-    def write(checkpoint, out, facts):
+    def write(checkpoint, out, facts, *, beside):
         asked.append((checkpoint, facts))
         out.mkdir()
         (out / "model.safetensors").write_bytes(bytes(1_000_000))
@@ -30,7 +30,12 @@ def test_the_options_are_facts_of_the_card_and_the_size_is_told(monkeypatch, tmp
 
 
 def test_how_it_was_trained_stays_known(monkeypatch, tmp_path):
-    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts: out.mkdir())
+    def write(checkpoint, out, facts, *, beside):
+        out.mkdir()
+        for name, text in beside.items():
+            (out / name).write_text(text)
+
+    monkeypatch.setattr(export, "export_checkpoint", write)
     checkpoint = tmp_path / "train" / "paired" / "checkpoints" / "000400" / "pretrained_model"
     checkpoint.mkdir(parents=True)
     config = {"dataset": {"repo_id": "local/x", "episodes": [0, 1, 2]}, "batch_size": 8, "seed": 7}

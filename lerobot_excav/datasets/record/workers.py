@@ -90,7 +90,8 @@ def episode_results[Result](future: Future[list[Result]]) -> list[Result]:
         return future.result()
     except BrokenProcessPool as error:
         raise ExcavError(
-            "a worker process died (out of memory?); go on with --resume=true, perhaps with fewer --workers"
+            "a worker process died (out of memory?); run the command again, with --resume=true where it has that, and "
+            "perhaps with fewer --workers"
         ) from error
 
 

@@ -1,12 +1,12 @@
 """The film of an episode that an environment writes while it goes on, with its very last picture."""
 
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.video_file import VideoFile
-from lerobot_excav.errors import ConfigurationError
 
 _QUALITY = 22
 
@@ -23,18 +23,24 @@ class Film:
         self._folder, self._fps = folder, fps
         self._video: VideoFile | None = None
 
+    @property
+    def is_running(self) -> bool:
+        """Whether an episode is being filmed."""
+        return self._video is not None
+
     def begin(self, name: str) -> None:
         """Begin the film of an episode; one that has not come to its end is left out.
 
+        Where a film of this name exists, as of the same scene at an earlier evaluation of a training, it stays, and the
+        new one gets a number behind its name.
+
         Raises:
-            ConfigurationError: There is a film of this name.
             OSError: It cannot be written.
         """
         self.leave_out()
-        path = self._folder / f"{name}.mp4"
-        if path.exists():
-            raise ConfigurationError(f"film_folder: {path} exists; choose another film_folder, or move the film away")
-        self._video = VideoFile(path, self._fps, crf=_QUALITY)
+        names = chain([name], (f"{name}_{number}" for number in count(2)))
+        paths = (self._folder / f"{name}.mp4" for name in names)
+        self._video = VideoFile(next(path for path in paths if not path.exists()), self._fps, crf=_QUALITY)
 
     def add(self, picture: NDArray[np.uint8]) -> None:
         """Append a picture (H, W, 3)."""

@@ -101,7 +101,7 @@ class WatchedEnv(ABC):
         """Begin the film of an episode, if films are wanted.
 
         Raises:
-            ConfigurationError: There is a film of this name.
+            OSError: It cannot be written.
         """
         if (folder := self.render_settings.film_folder) is None:
             return

@@ -1,6 +1,6 @@
 """Who acts in an audit: a policy from a checkpoint, or the scripted operator."""
 
-from collections.abc import Callable
+import hashlib
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,22 +21,19 @@ class Actor(Protocol):
         """Return the next action, (actions,)."""
 
 
-MakeActor = Callable[[], Actor]
-
-
 class OperatorActor:
-    """The scripted operator of a task.
+    """The scripted operator of a task, who works in the same manner after every `begin`.
 
     Args:
-        env: An environment of the task.
-        rng: Source of the operator's style.
+        seed: Seed of that manner.
     """
 
-    def __init__(self, env: MaskedTaskEnv[Any, Any], rng: np.random.Generator) -> None:
-        self._operator = env.task_spec.make_operator(rng)
+    def __init__(self, *seed: int) -> None:
+        self._seed = seed
 
     def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
         """Let it look at the scene."""
+        self._operator = env.task_spec.make_operator(np.random.default_rng(self._seed))
         self._operator.reset(env)
 
     def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> NDArray[np.float32]:
@@ -57,19 +54,9 @@ class PolicyActor:
 
     def __init__(self, checkpoint: Path, overrides: tuple[str, ...] = ()) -> None:
         import torch
-        from lerobot.configs import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
-        from lerobot.utils.import_utils import register_third_party_plugins
 
-        register_third_party_plugins()
-        if not (checkpoint / "config.json").is_file():
-            raise ConfigurationError(
-                f"{checkpoint} holds no policy (config.json is missing); give the pretrained_model folder of a run of "
-                "lerobot-train, or a folder that lerobot-excav export has written"
-            )
-        config = PreTrainedConfig.from_pretrained(checkpoint, cli_overrides=list(overrides))
-        config.pretrained_path = checkpoint
-        self._torch = torch
+        self._torch, config = torch, policy_config(checkpoint, overrides)
         self._policy = get_policy_class(config.type).from_pretrained(checkpoint, config=config)
         self._policy.eval()
         device = {"device_processor": {"device": str(config.device)}}
@@ -78,8 +65,9 @@ class PolicyActor:
         )
 
     def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
-        """Forget plans and targets."""
+        """Forget plans and targets; a policy that samples draws the same numbers again."""
         self._policy.reset()
+        self._torch.manual_seed(0)
 
     def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> NDArray[np.float32]:
         """Return its next action, (actions,)."""
@@ -89,3 +77,41 @@ class PolicyActor:
         with self._torch.inference_mode():
             action = self._after(self._policy.select_action(self._before(batch)))
         return np.asarray(action[0].numpy(), np.float32)
+
+
+def policy_config(checkpoint: Path, overrides: tuple[str, ...] = ()) -> Any:
+    """Return the configuration of a policy, some of whose settings differ from the checkpoint's.
+
+    Raises:
+        ConfigurationError: The folder holds no policy, or a setting is not possible.
+    """
+    from draccus.utils import DraccusException
+    from lerobot.configs import PreTrainedConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    if not (checkpoint / "config.json").is_file():
+        raise ConfigurationError(
+            f"{checkpoint} holds no policy (config.json is missing); give the pretrained_model folder of a run of "
+            "lerobot-train, or a folder that lerobot-excav export has written"
+        )
+    try:
+        config = PreTrainedConfig.from_pretrained(checkpoint, cli_overrides=list(overrides))
+    except ConfigurationError:
+        raise
+    # LeRobot's parser ends the program at an option that a policy does not have.
+    except (DraccusException, ValueError, TypeError, SystemExit) as error:
+        wanted = f" with {' '.join(overrides)}" if overrides else ""
+        raise ConfigurationError(f"{checkpoint} cannot be used{wanted}: {' '.join(str(error).split())}") from error
+    config.pretrained_path = checkpoint
+    return config
+
+
+def policy_digest(checkpoint: Path) -> str:
+    """Return a digest (SHA-256) of the files of a policy; folders such as `last` may hold another one tomorrow."""
+    digest = hashlib.sha256()
+    for path in sorted(checkpoint.glob("*.json")) + sorted(checkpoint.glob("*.safetensors")):
+        digest.update(path.name.encode())
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()

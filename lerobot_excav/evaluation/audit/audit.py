@@ -12,6 +12,7 @@ from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.workers import episode_results, submit_episodes, worker_pool
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.evaluation.audit.actor import policy_config
 from lerobot_excav.evaluation.audit.branch import Branch
 from lerobot_excav.evaluation.audit.obedience import Obedience, obedience
 from lerobot_excav.evaluation.audit.scene_branches import audit_scene, read_scene
@@ -61,10 +62,11 @@ def play_audit(settings: AuditSettings, folder: Path, *, workers: int, show_prog
     """Play the scenes that a folder does not hold yet; every finished scene is a file in it.
 
     Raises:
-        ConfigurationError: The folder holds scenes of other settings.
+        ConfigurationError: A policy cannot be used as asked for, or the folder holds scenes of other settings.
         DatasetError: Another process is at it, or a file is damaged.
         ExcavError: A scene could not be played.
     """
+    require_policies(settings)
     folder.mkdir(parents=True, exist_ok=True)
     lock = RunLock(folder / ".lock", folder)
     try:
@@ -78,6 +80,17 @@ def play_audit(settings: AuditSettings, folder: Path, *, workers: int, show_prog
                 episode_results(future)
     finally:
         lock.release()
+
+
+def require_policies(settings: AuditSettings) -> None:
+    """Check that all policies are there, and can plan as asked for.
+
+    Raises:
+        ConfigurationError: One is not, or cannot.
+    """
+    for variant in settings.variants:
+        if variant.checkpoint is not None:
+            policy_config(variant.checkpoint, variant.overrides)
 
 
 def read_audit(settings: AuditSettings, folder: Path, *, seed: int = 0) -> Audit:

@@ -100,7 +100,7 @@ class State:
     prefix: Prefix | None = None
     frame: int = 0
 
-    def reach(self, env: MaskedTaskEnv[Any, Any], target_id: int) -> tuple[dict[str, Any], PlaceProbe]:
+    def reach(self, env: MaskedTaskEnv[Any, Any], target_id: int) -> tuple[dict[str, Any], "Watch"]:
         """Bring an environment into this state, with the mask of a target from here on; return what is observed.
 
         Raises:
@@ -111,14 +111,43 @@ class State:
         commands = [(self.frame, target_id)] if first_id != target_id else []
         start = {"scene_id": self.scene_id, "stage": self.stage, "target_id": first_id, "commands": commands}
         observation, _ = env.reset(options=start)
-        probe = env.task_spec.make_place_probe(env)
+        watch = Watch(env.task_spec.make_place_probe(env))
         if self.prefix is None:
-            return observation, probe
+            return observation, watch
         for action in self.prefix.actions[: self.frame]:
             observation, *_ = env.step(action)
-            probe.update()
+            watch.update()
         self.prefix.require_state(self.frame, observation["agent_pos"])
-        return observation, probe
+        return observation, watch
+
+
+class Watch:
+    """Follows an episode, and notes when acting begins.
+
+    Attributes:
+        probe: What tells where the machine acts.
+        began_frame: Frame in which acting began, since the start; None before.
+    """
+
+    def __init__(self, probe: PlaceProbe) -> None:
+        self.probe = probe
+        self.began_frame: int | None = None
+        self._frame = 0
+
+    def update(self) -> None:
+        """Take in the frame that has just passed."""
+        self.probe.update()
+        self._frame += 1
+        if self.began_frame is None and self.probe.has_begun:
+            self.began_frame = self._frame
+
+    def acted(self) -> dict[str, Any]:
+        """Return the fields of a branch that say where the machine has acted."""
+        acted = self.probe.acted()
+        if acted is None:
+            return dict.fromkeys(("began_frame", "began_w", "acted_w", "share"))
+        places = {"began_w": _place(acted.began_w), "acted_w": _place(acted.acted_w)}
+        return {"began_frame": self.began_frame, **places, "share": round(acted.share, 4)}
 
 
 def play_branch(
@@ -144,9 +173,9 @@ def play_branch(
         TargetAbsentError: The scene has no such target.
         ExcavError: The environment does not repeat itself.
     """
-    observation, probe = state.reach(env, target_id)
+    observation, watch = state.reach(env, target_id)
     actor.begin(env)
-    commanded_w, began_frame = probe.commanded_w, None
+    commanded_w = watch.probe.commanded_w
     actions: list[NDArray[np.float32]] = []
     path_w: list[NDArray[np.float64]] = []
     is_over = is_success = False
@@ -155,12 +184,10 @@ def play_branch(
         if record is not None:
             record.add(observation["agent_pos"], action)
         actions.append(action)
-        path_w.append(probe.tool_pos_w)
+        path_w.append(watch.probe.tool_pos_w)
         observation, _, terminated, truncated, info = env.step(action)
         is_over, is_success = terminated or truncated, bool(info["is_success"])
-        probe.update()
-        if began_frame is None and probe.has_begun:
-            began_frame = state.frame + len(actions)
+        watch.update()
     return Branch(
         scene_id=state.scene_id,
         moment=state.moment,
@@ -170,16 +197,8 @@ def play_branch(
         tool_path_w=_rounded(path_w, 3),
         commanded_w=_place(commanded_w),
         is_success=is_success,
-        **_acted(probe, began_frame),
+        **watch.acted(),
     )
-
-
-def _acted(probe: PlaceProbe, began_frame: int | None) -> dict[str, Any]:
-    acted = probe.acted()
-    if acted is None:
-        return dict.fromkeys(("began_frame", "began_w", "acted_w", "share"))
-    places = {"began_w": _place(acted.began_w), "acted_w": _place(acted.acted_w)}
-    return {"began_frame": began_frame, **places, "share": round(acted.share, 4)}
 
 
 def _rounded(rows: Sequence[NDArray[Any]], digits: int) -> list[list[float]]:

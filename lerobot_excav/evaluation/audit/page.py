@@ -3,11 +3,11 @@
 import json
 from pathlib import Path
 
+from lerobot_excav.evaluation.audit import verdict as thresholds
 from lerobot_excav.evaluation.audit.audit import Audit
 from lerobot_excav.evaluation.audit.figures import draw_paths, draw_places, draw_separation
 from lerobot_excav.evaluation.audit.obedience import Obedience
 from lerobot_excav.evaluation.audit.settings import FOLLOWED_S, LEAD_S, POLICY
-from lerobot_excav.evaluation.audit.verdict import FIRM_SLOPE, LEAST_ACTED, PARTLY_SLOPE
 from lerobot_excav.evaluation.markdown import interval_text, render
 from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.statistics import Interval
@@ -31,8 +31,9 @@ def audit_text(audit: Audit) -> str:
         sentence=f"Verdict: **{verdict.verdict}**; {verdict.reason}.",
         header=HEADER,
         rows=[_row(label, audit.verdicts[label].verdict, found) for label, found in audit.obedience.items()],
-        **{"lead_s": LEAD_S, "followed_s": FOLLOWED_S, "least_acted": 100.0 * LEAST_ACTED, "firm": FIRM_SLOPE},
-        partly=PARTLY_SLOPE,
+        lead_s=LEAD_S,
+        followed_s=FOLLOWED_S,
+        thresholds=thresholds,
     )
 
 

@@ -7,7 +7,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from lerobot_excav.datasets.format.validated import validated_file
@@ -69,7 +68,7 @@ def _variant_branches(
     env: MaskedTaskEnv[Any, Any], settings: AuditSettings, variant: Variant, scene_id: int
 ) -> Iterator[Branch]:
     """Play every mask from the start, and, where the variant asks for it, from later moments of one of these plays."""
-    actor = _actor(settings, variant, env, scene_id)
+    actor = _actor(settings, variant, scene_id)
     start = State(scene_id=scene_id, stage=settings.stage)
     target_count = env.task_spec.target_count
     prefix, plays = Prefix(scene_id % target_count), {}
@@ -95,9 +94,9 @@ def _later_moments(reference: Branch | None, variant: Variant, fps: int) -> list
     return [(moment, frame) for moment, frame in frames.items() if moment in variant.moments and 0 < frame <= last]
 
 
-def _actor(settings: AuditSettings, variant: Variant, env: MaskedTaskEnv[Any, Any], scene_id: int) -> Actor:
+def _actor(settings: AuditSettings, variant: Variant, scene_id: int) -> Actor:
     if variant.checkpoint is None:
-        return OperatorActor(env, np.random.default_rng((settings.seed, scene_id)))
+        return OperatorActor(settings.seed, scene_id)
     return _policy(variant.checkpoint, variant.overrides)
 
 

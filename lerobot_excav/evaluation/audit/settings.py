@@ -8,6 +8,7 @@ from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.errors import require
+from lerobot_excav.evaluation.audit.actor import policy_digest
 
 POLICY, AGAINST, OPERATOR = "policy", "against", "operator"
 """Labels of who acts; a variant of the policy is called by what differs, such as `policy, n_action_steps=5`."""
@@ -72,6 +73,12 @@ class AuditSettings:
             0 <= self.stage <= spec.last_stage,
             f"--stage={self.stage} is not possible; allowed for {spec.id}: 0 to {spec.last_stage}",
         )
+        retarget_frame = getattr(self.env, "retarget_frame", None)
+        require(
+            retarget_frame is None,
+            f"--env.retarget_frame={retarget_frame} has no place in an audit, which changes the command itself; leave "
+            "it out",
+        )
         labels = [variant.label for variant in self.variants]
         require(len(set(labels)) == len(labels), f"--n_action_steps names a number twice: {', '.join(labels)}")
 
@@ -94,7 +101,7 @@ class AuditSettings:
             "stage": self.stage,
             "seed": self.seed,
             "variants": [
-                [v.label, None if v.checkpoint is None else str(v.checkpoint), list(v.overrides), list(v.moments)]
+                [v.label, None if v.checkpoint is None else policy_digest(v.checkpoint), [*v.overrides], [*v.moments]]
                 for v in self.variants
             ],
         }

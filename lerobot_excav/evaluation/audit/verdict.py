@@ -14,11 +14,15 @@ OBEYS, PARTLY, INSENSITIVE, OUT_OF_SUPPORT, UNDECIDED = VERDICTS = (
 
 LEAST_ACTED = 0.5
 """A policy that acts after fewer of the masks is out of support (kind: guess)."""
-FIRM_SLOPE = 0.8
-"""Least slope of a policy that obeys (kind: design); its interval has to lie above `PARTLY_SLOPE[1]`."""
-PARTLY_SLOPE = (0.2, 0.7)
-"""A slope whose interval lies below the first is none; one whose interval lies between both is obedience in part
-(kind: guess)."""
+LEAST_SCENES = 5
+"""Below that nothing is decided (kind: guess)."""
+OBEDIENT_SLOPE = (0.8, 1.25)
+"""Slopes of a policy that obeys (kind: design from below, guess from above)."""
+OBEDIENT_LOW = 0.7
+"""Above that its interval lies (kind: guess)."""
+INSENSITIVE_SLOPE = 0.2
+"""A slope whose interval lies below is none; one whose interval lies between that and `OBEDIENT_SLOPE[0]` is obedience
+in part (kind: guess)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,14 +46,19 @@ def judge(found: Obedience) -> Verdict:
             verdict=OUT_OF_SUPPORT,
             reason=f"the machine acts after {acted:.0f} % of the masks only (less than {100.0 * LEAST_ACTED:.0f} %)",
         )
-    if found.slope is None:
-        return Verdict(verdict=UNDECIDED, reason="no scene has two masks after which the machine acts")
+    if found.scenes < LEAST_SCENES or found.slope is None:
+        return Verdict(
+            verdict=UNDECIDED, reason=f"{found.scenes} scenes are too few; at least {LEAST_SCENES} are needed"
+        )
     low, high, slope = found.slope.low, found.slope.high, found.slope.estimate
     shown = f"the slope of {slope:.2f} [{low:.2f}, {high:.2f}]"
-    if slope >= FIRM_SLOPE and low > PARTLY_SLOPE[1]:
-        return Verdict(verdict=OBEYS, reason=f"{shown} is at least {FIRM_SLOPE}, its interval above {PARTLY_SLOPE[1]}")
-    if high < PARTLY_SLOPE[0]:
-        return Verdict(verdict=INSENSITIVE, reason=f"{shown} has its interval below {PARTLY_SLOPE[0]}")
-    if low > PARTLY_SLOPE[0] and high < FIRM_SLOPE:
-        return Verdict(verdict=PARTLY, reason=f"{shown} has its interval between {PARTLY_SLOPE[0]} and {FIRM_SLOPE}")
+    least, most = OBEDIENT_SLOPE
+    if least <= slope <= most and low > OBEDIENT_LOW:
+        return Verdict(
+            verdict=OBEYS, reason=f"{shown} lies between {least} and {most}, its interval above {OBEDIENT_LOW}"
+        )
+    if high < INSENSITIVE_SLOPE:
+        return Verdict(verdict=INSENSITIVE, reason=f"{shown} has its interval below {INSENSITIVE_SLOPE}")
+    if low > INSENSITIVE_SLOPE and high < least:
+        return Verdict(verdict=PARTLY, reason=f"{shown} has its interval between {INSENSITIVE_SLOPE} and {least}")
     return Verdict(verdict=UNDECIDED, reason=f"{shown} has an interval that allows for more than one verdict")

@@ -113,7 +113,7 @@ class Contents(_Table):
         labels, names = [row.label for row in self.rows], [name for row in self.rows for name in row.names]
         # A page keeps the metrics of a curve by the name of its folder.
         folders = [Path(curve.folder).name for curve in self.curve]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
+        if twice := sorted({name for one in (labels, names) for name in one if one.count(name) > 1}):
             raise ValueError(f"{twice} stands on the page twice")
         if twice := sorted({name for name in folders if folders.count(name) > 1}):
             raise ValueError(f"{twice} are the folders of two curves; name each folder once")

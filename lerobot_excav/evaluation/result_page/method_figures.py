@@ -26,7 +26,11 @@ class MethodFigure:
 
     def draw(self, path: Path) -> None:
         """Draw it into a file."""
-        resolve_name(self.entry)({row.row.about: row.run.episodes for row in self.section.rows}, path)
+        rows = [row.row for row in self.section.rows]
+        abouts = [row.about for row in rows]
+        names = [row.about if abouts.count(row.about) == 1 else row.label for row in rows]
+        runs = [row.run.episodes for row in self.section.rows]
+        resolve_name(self.entry)(dict(zip(names, runs, strict=True)), path)
 
 
 def method_figures(section: PageSection) -> list[MethodFigure]:

@@ -8,6 +8,7 @@ import numpy as np
 from lerobot_excav.envs.tasks.measures import TaskMeasures
 from lerobot_excav.errors import require
 from lerobot_excav.evaluation.comparison import Difference, compare, require_same_task
+from lerobot_excav.evaluation.crossed_effects import holm
 from lerobot_excav.evaluation.metrics import Evaluation, read_evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report import file_notes
@@ -15,7 +16,6 @@ from lerobot_excav.evaluation.result_page.contents import Contents, Row, Section
 from lerobot_excav.evaluation.result_page.curves import SuccessCurve, read_curve
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.run_summary import RunSummary, measured
-from lerobot_excav.evaluation.seed_bootstrap import holm
 from lerobot_excav.evaluation.training import TrainingFacts
 
 
@@ -128,7 +128,7 @@ def make_page(contents: Contents, *, seed: int = 0) -> ResultPage:
     }
     return ResultPage(
         contents=contents,
-        sections=[_section(section, rows, rng) for section in contents.section],
+        sections=[_section(section, rows) for section in contents.section],
         curves=[curve for curve in map(read_curve, contents.curve) if curve.points],
         bootstrap_seed=seed,
     )
@@ -144,7 +144,7 @@ def _row(contents: Contents, row: Row, run: Run, operator: Run | None, rng: np.r
     return PageRow(row=row, run=run, values=measured(run, operator, rng), origins=origins)
 
 
-def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generator) -> PageSection:
+def _section(section: Section, rows: dict[str, PageRow]) -> PageSection:
     present = [rows[row.label] for row in section.rows if row.label in rows]
     reference = rows.get(section.reference or "")
     for row in present:
@@ -156,7 +156,7 @@ def _section(section: Section, rows: dict[str, PageRow], rng: np.random.Generato
         section=section,
         rows=present,
         missing=[name for row in section.rows for name in row.names if not _has(rows, row, name)],
-        differences=_corrected([_difference(reference.run, row.run, rng) for row in others if reference]),
+        differences=_corrected([_difference(reference.run, row.run) for row in others if reference]),
     )
 
 
@@ -172,10 +172,10 @@ def _require_known_figures(section: Section, measures: TaskMeasures) -> None:
             require(key in measures.compared, f"row {row.label!r}: paper.{key} has no column; allowed: {allowed}")
 
 
-def _difference(reference: Run, run: Run, rng: np.random.Generator) -> PageDifference:
+def _difference(reference: Run, run: Run) -> PageDifference:
     """Compare on common scenes: a row may have played fewer of them than its reference."""
     common = set(reference.keys) & set(run.keys)
-    differences = compare(reference.only(common), run.only(common), rng) if common else []
+    differences = compare(reference.only(common), run.only(common)) if common else []
     return PageDifference(label=run.label, reference=reference.label, scenes=len(common), differences=differences)
 
 

@@ -4,6 +4,7 @@ import copy
 import os
 import shutil
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import torch
@@ -23,7 +24,9 @@ WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 TRAINING_ONLY = "model.action_encoder."  # the encoder of the variational latent, which is zero at run time
 
 
-def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = None) -> Path:
+def export_checkpoint(
+    checkpoint: Path, out: Path, facts: CardFacts | None = None, *, beside: Mapping[str, str] | None = None
+) -> Path:
     """Write a small copy of a trained policy that LeRobot loads like any other.
 
     Parameters are stored in half precision (float16: 11 significant bits) and load into a float32 network as usual;
@@ -36,6 +39,7 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
         out: Folder to write, which appears when it is complete: `config.json`, `model.safetensors`, the processors,
             `README.md`; it is returned.
         facts: What the model card tells beyond what the checkpoint knows.
+        beside: Further texts by the names of their files.
 
     Raises:
         ConfigurationError: The folder does not hold a whole checkpoint of `mask_act`, or holds a weight beyond half
@@ -66,6 +70,8 @@ def export_checkpoint(checkpoint: Path, out: Path, facts: CardFacts | None = Non
             for file in sorted(checkpoint.glob(f"{Path(name).stem}*")):
                 shutil.copyfile(file, folder / file.name)
         card.save(folder / CARD)
+        for name, text in (beside or {}).items():
+            (folder / name).write_text(text, encoding="utf-8")
         if place.is_dir():
             place.rmdir()  # it is empty
         folder.rename(place)

@@ -7,7 +7,7 @@ import pytest
 
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.errors import ConfigurationError
-from lerobot_excav.evaluation.audit.actor import PolicyActor
+from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config, policy_digest
 
 CHECKPOINT = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
 FRAMES = 8
@@ -50,3 +50,19 @@ def test_a_policy_plans_as_its_checkpoint_says_or_as_asked_for(env):
 def test_what_is_no_policy_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match="holds no policy"):
         PolicyActor(tmp_path)
+
+
+@pytest.mark.parametrize("override", ["--n_action_steps=1000", "--colour=red", "--n_action_steps=many"])
+def test_a_setting_that_a_policy_cannot_have_is_an_error_of_ours(override):
+    with pytest.raises(ConfigurationError):
+        policy_config(CHECKPOINT, (override,))
+
+
+def test_a_digest_tells_policies_apart(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "config.json").write_text("{}")
+        (tmp_path / name / "model.safetensors").write_bytes(b"1")
+    assert policy_digest(tmp_path / "a") == policy_digest(tmp_path / "b")
+    (tmp_path / "b" / "model.safetensors").write_bytes(b"2")
+    assert policy_digest(tmp_path / "a") != policy_digest(tmp_path / "b")

@@ -8,6 +8,7 @@ import toy_reach  # noqa: F401 - registers the example task
 
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError, ExcavError
+from lerobot_excav.evaluation.audit import audit as audit_module
 from lerobot_excav.evaluation.audit import scene_branches
 from lerobot_excav.evaluation.audit.audit import play_audit, read_audit
 from lerobot_excav.evaluation.audit.page import audit_text, write_audit
@@ -29,6 +30,7 @@ def policies(monkeypatch):
         return Planted(SLOPES[checkpoint.name])
 
     monkeypatch.setattr(scene_branches, "_policy", load)
+    monkeypatch.setattr(audit_module, "policy_config", lambda *_: None)
     monkeypatch.setattr("toy_reach.env.FRAMES_ON_TARGET", 15)  # long enough for a mask that is given after arriving
     monkeypatch.setattr(scene_branches, "LEAD_S", 0.3)  # the disc arrives within a second
     return loaded
@@ -142,7 +144,7 @@ def test_variants_are_the_same_policy_planning_otherwise(tmp_path, policies):
 
 def test_the_command_writes_a_page_with_pictures_and_the_same_as_data(tmp_path, capsys):
     out = tmp_path / "audit"
-    options = ["--env.type=toy_reach", "--scenes=2", "--workers=0", f"--out={out}"]
+    options = ["--env.type=toy_reach", "--scenes=5", "--workers=0", f"--out={out}"]
     small = [f"--env.{name}={value}" for name, value in SMALL.items()]
     command = ["audit", str(tmp_path / "half"), *options, *small]
     assert main([*command, f"--against={tmp_path / 'obeys'}", "--n_action_steps=[1,2]", "--ensemble=0.1"]) == 0
@@ -183,8 +185,51 @@ def test_what_cannot_be_audited_is_said_before_anything_is_played(tmp_path, caps
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_few_scenes_decide_nothing(tmp_path):
+    audit = audited(tmp_path, "obeys", scenes=4)
+    assert audit.verdicts[POLICY].verdict == "undecided"
+    assert "4 scenes with at least two masks to act on are too few" in audit.verdicts[POLICY].reason
+
+
+def test_a_policy_that_goes_too_far_does_not_obey(tmp_path, monkeypatch):
+    monkeypatch.setitem(SLOPES, "too far", 1.6)
+    audit = audited(tmp_path, "too far")
+    assert audit.obedience[POLICY].slope.estimate > 1.4
+    assert audit.verdicts[POLICY].verdict == "undecided"
+
+
+def test_the_operator_works_in_the_same_manner_under_every_mask(tmp_path, monkeypatch):
+    paces = []
+    make = type(env_types()["toy_reach"]).make_operator
+
+    def noted(spec, rng):
+        paces.append(make(spec, rng))
+        return paces[-1]
+
+    monkeypatch.setattr(type(env_types()["toy_reach"]), "make_operator", noted)
+    audited(tmp_path, "still", scenes=2)
+    of_scenes = [{operator._pace for operator in paces[:4]}, {operator._pace for operator in paces[4:]}]
+    assert [len(found) for found in of_scenes] == [1, 1]
+    assert of_scenes[0] != of_scenes[1]
+
+
+def test_another_policy_in_the_same_folder_is_not_mixed_in(tmp_path):
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / "model.safetensors").write_bytes(b"one")
+    audited(tmp_path, "half", scenes=1)
+    (tmp_path / "half" / "model.safetensors").write_bytes(b"trained on")
+    with pytest.raises(ConfigurationError, match="holds scenes of another audit: variants is"):
+        audited(tmp_path, "half", scenes=2)
+
+
+def test_a_command_that_changes_by_itself_has_no_place_in_an_audit(tmp_path, capsys):
+    arguments = ["audit", str(tmp_path), f"--out={tmp_path / 'out'}", "--env.type=fr5_grasp"]
+    assert main([*arguments, "--env.retarget_frame=25"]) == 2
+    assert "--env.retarget_frame=25 has no place in an audit" in capsys.readouterr().err
+
+
 def test_the_text_is_the_page_without_its_pictures(tmp_path):
-    audit = audited(tmp_path, "ignores", scenes=2)
+    audit = audited(tmp_path, "ignores", scenes=5)
     text = audit_text(audit)
     assert "Verdict: **insensitive**; the slope of" in text
     assert "](audit_" not in text

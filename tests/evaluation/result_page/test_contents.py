@@ -19,6 +19,10 @@ PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
         (f'[[section]]\ntitle = "s"\noperator = "b"\nrows = [{ROW}]', "operator 'b' is not a row; allowed: a"),
         (SECTION + 'rows = [{ label = "a", about = "x", seeds = [1, 1] }]', r"\['a-1'\] stands on the page twice"),
         (SECTION + 'rows = [{ label = "a", about = "x", seeds = [-1] }]', r"seeds\[0\]=-1"),
+        (
+            SECTION + 'rows = [{ label = "a", about = "x", seeds = [1] }, { label = "a", about = "y", seeds = [2] }]',
+            r"\['a'\] stands on the page twice",
+        ),
         ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
         ('[[clips]]\nlabel = "a"\nepisode = [1]', r"clips\[0\]\.episode is not known; allowed: label, episodes"),
         ("[[", "is not TOML"),

@@ -238,6 +238,9 @@ def test_p_values_are_corrected_for_the_rows_that_are_compared(seeded):
     assert corrected[0] == pytest.approx(3 * p_values[0])
     assert max(near.p_corrected, none.p_corrected) < 0.01
     assert operator.p_corrected > 0.05
+    rate = make_page(seeded).rows[0]["target_success"]
+    assert rate.low < 0.9  # as twenty scenes allow, though both trainings hit nearly always
+    assert rate.high == 1.0
 
 
 def test_copies_of_several_seeds_make_the_same_page_again(seeded, tmp_path, read_rows):

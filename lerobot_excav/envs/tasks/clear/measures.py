@@ -202,7 +202,7 @@ CLEAR_MEASURES = TaskMeasures(
         ),
     ),
     compared=("pile_removed", "success"),
-    world="dug {soil} in version {simulation_version} of the simulation",
+    world="dug {soil} within {episode_length} frames in version {simulation_version} of the simulation",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
     outcome=clear_outcome,
