@@ -14,7 +14,7 @@ rm -rf "$OUT/play" "$OUT/film" "$OUT/metrics.jsonl"
 lerobot-eval --policy.path="$CHECKPOINT" --policy.device=cpu \
   --env.type=excavator --env.task=Clear-v0 --env.scene_set=test --seed="$SCENE" \
   --env.film_folder="$OUT/film" --env.film_every="$EVERY" --env.render_camera=overview_with_side \
-  --env.render_height=96 --env.render_width=128 --env.render_every="$EVERY" --env.metrics_path="$OUT/metrics.jsonl" \
+  --env.render_mode=null --env.metrics_path="$OUT/metrics.jsonl" \
   --eval.n_episodes=1 --eval.batch_size=1 --output_dir="$OUT/play"
 
 say "Result"

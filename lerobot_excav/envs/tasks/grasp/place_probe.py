@@ -22,7 +22,7 @@ class TakenBlock:
         self._env = env
         self._block_pos_w = env.workcell.block_pos_w.copy()
         self._block = NO_BLOCK
-        self._began_w = np.zeros(2)
+        self._began_w: NDArray[np.float64] = np.zeros(2)
 
     def update(self) -> None:
         """Take in the frame that has just passed."""
