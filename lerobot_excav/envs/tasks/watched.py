@@ -111,10 +111,9 @@ class WatchedEnv(ABC):
 
     def _add_to_film(self) -> None:
         """Add the present picture to the film if its turn has come; the end of the episode is its end."""
-        settings = self.render_settings
-        if self._film is None or not (
-            self._is_over or round(self.time_s * self.settings.fps) % settings.film_every == 0
-        ):
+        settings, frame = self.render_settings, round(self.time_s * self.settings.fps)
+        is_due = frame % settings.film_every == 0 or self._is_over
+        if self._film is None or not self._film.is_running or not is_due:
             return
         if self._film_view is None:
             self._film_view = self._make_view(settings.film_height, settings.film_width)

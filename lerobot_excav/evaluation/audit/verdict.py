@@ -47,9 +47,8 @@ def judge(found: Obedience) -> Verdict:
             reason=f"the machine acts after {acted:.0f} % of the masks only (less than {100.0 * LEAST_ACTED:.0f} %)",
         )
     if found.scenes < LEAST_SCENES or found.slope is None:
-        return Verdict(
-            verdict=UNDECIDED, reason=f"{found.scenes} scenes are too few; at least {LEAST_SCENES} are needed"
-        )
+        few = f"{found.scenes} scenes with at least two masks to act on are too few; {LEAST_SCENES} are needed"
+        return Verdict(verdict=UNDECIDED, reason=few)
     low, high, slope = found.slope.low, found.slope.high, found.slope.estimate
     shown = f"the slope of {slope:.2f} [{low:.2f}, {high:.2f}]"
     least, most = OBEDIENT_SLOPE
