@@ -90,8 +90,8 @@ def test_a_time_limit_within_a_cycle_leaves_it_unfinished():
     env.close()
 
 
-def test_an_episode_lasts_16_cycles_of_25_s_at_most(env):
-    assert env.episode_length == 16 * 25 * 10
+def test_an_episode_lasts_20_cycles_of_25_s_at_most(env):
+    assert env.episode_length == 20 * 25 * 10
 
 
 def test_operator_clears_cycle_by_cycle_and_every_part_is_told(cleared):
