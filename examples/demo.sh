@@ -6,6 +6,7 @@ OUT=${1:?usage: demo.sh OUTPUT_FOLDER}
 CHECKPOINT=${DEMO_CHECKPOINT:-checkpoints/excavator_mask_act}
 SCENE=${DEMO_SCENE:-0} # of the test scenes, none of which a demonstration has seen
 EVERY=10               # one frame a second is drawn: a time lapse, ten times faster to make
+export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} # the network is small: more threads wait for each other
 source "$(dirname "$0")/own_folder.sh"
 require_checkpoint "$CHECKPOINT"
 
