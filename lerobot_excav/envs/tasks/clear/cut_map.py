@@ -30,7 +30,7 @@ def draw_cut_map(piles: Sequence[ClearRecord], path: Path) -> None:
     figure = Figure(figsize=(_PANEL_IN[0] * len(piles), _PANEL_IN[1]), dpi=110, layout="constrained")
     for axes, pile in zip(np.atleast_1d(figure.subplots(1, len(piles))), piles, strict=True):
         draw_pile(axes, pile)
-    key = "Squares: commanded regions, green where digging began inside; dots: where it began"
+    key = "Squares: commanded regions, green where digging began inside;\ndots: where it began"
     figure.suptitle(key + of, fontsize=9)
     figure.savefig(path, metadata={"Software": None})
 
