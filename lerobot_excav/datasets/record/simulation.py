@@ -71,7 +71,7 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
 
     The environment stays open for the next call with the same settings. Without pictures it is several times faster.
     """
-    env = _open_environment(played.env, with_images=with_images)
+    env = open_environment(played.env, with_images=with_images)
     operator = played.task_spec.make_operator(np.random.default_rng(played.episode_seed(pair)))
     return demonstrate(env, operator, pair)
 
@@ -116,7 +116,7 @@ def play_again(
 _open: list[tuple[TaskSettings, bool, MaskedTaskEnv[Any, Any]]] = []
 
 
-def _open_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
+def open_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:
     """Return the environment of the last call if it was the same one; to open a graphics context is slow."""
     if not _open or _open[0][:2] != (settings, with_images):
         for *_, env in _open:

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from lerobot_excav.datasets.format.validated import validated_file
+from lerobot_excav.datasets.record.simulation import open_environment
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import TargetAbsentError
 from lerobot_excav.errors import DatasetError, ExcavError
@@ -51,7 +52,7 @@ def audit_scene(settings: AuditSettings, scene_id: int, folder: Path) -> list[di
     if scene_file(folder, scene_id).exists():
         return [{"success": True}]
     try:
-        env = _environment(settings)
+        env = open_environment(settings.env, with_images=True)
         branches = {
             variant.label: list(_variant_branches(env, settings, variant, scene_id)) for variant in settings.variants
         }
@@ -103,16 +104,3 @@ def _actor(settings: AuditSettings, variant: Variant, scene_id: int) -> Actor:
 @lru_cache(maxsize=8)
 def _policy(checkpoint: Path, overrides: tuple[str, ...]) -> PolicyActor:
     return PolicyActor(checkpoint, overrides)
-
-
-_open: list[tuple[Any, MaskedTaskEnv[Any, Any]]] = []
-
-
-def _environment(settings: AuditSettings) -> MaskedTaskEnv[Any, Any]:
-    """Return the environment of the last call if it was the same one; to open a graphics context is slow."""
-    if not _open or _open[0][0] != settings.env:
-        for _, env in _open:
-            env.close()
-        env = settings.task_spec.make_env(obs_type="pixels_agent_pos", render_mode=None, **settings.env.as_dict())
-        _open[:] = [(settings.env, env)]
-    return _open[0][1]
