@@ -206,7 +206,7 @@ def test_a_policy_with_other_weights_than_its_own_does_not_play(tmp_path_factory
 
 
 def test_an_export_that_believes_everything_is_found_out(tmp_path, trained, monkeypatch):
-    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts: out.mkdir())
+    monkeypatch.setattr(export, "export_checkpoint", lambda checkpoint, out, facts, **_: out.mkdir())
     change = harmful("no weights", weights_change(lambda weights: weights.clear()))
     with pytest.raises(AssertionError, match="accepted in silence"):
         judge(change, trained, tmp_path)

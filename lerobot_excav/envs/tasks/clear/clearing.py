@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.constants import TICK_S
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M
@@ -89,6 +90,11 @@ class Clearing:
             self._events.add(end, number, self.cycle, mass_kg)
         self.records.append(self._record(end))
         self._is_running = False
+
+    @property
+    def vain_w(self) -> list[NDArray[np.float64]]:
+        """Centres (3,) [m] of the regions whose cycles have brought nothing, so that others are tried first."""
+        return [np.array(record.region_w) for record in self.records if record.retained_mass_kg < LOADING_ONSET_KG]
 
     @property
     def left_kg(self) -> float:

@@ -28,8 +28,9 @@ class ClearEnv(ExcavatorEnv):
     """An 8-t excavator that digs a whole pile away, cycle by cycle.
 
     Task (`Clear-v0`): cycles as of `Scoop-v0` on one pile. When a cycle is over, the target planner looks at the depth
-    picture of `main`, commands the region with the most soil, and the mask changes. `target_id` is the rank of the
-    region among the planner's proposals: 0 unless options of `reset` say otherwise.
+    picture of `main`, commands the region with the most soil, and the mask changes. A region on which a cycle brought
+    nothing is commanded again only after all others. `target_id` is the rank of the region among the planner's
+    proposals: 0 unless options of `reset` say otherwise.
 
     A cycle is over when the bucket has been emptied into the box, when all of a lifted load was lost before the box, or
     after 25 s. The episode is over after 20 cycles, when nothing is left that is worth a cycle, or at the time limit.
@@ -107,7 +108,7 @@ class ClearEnv(ExcavatorEnv):
             )
         eye = self._planner_renderer
         self.surface = see_surface(eye.depth_m("main"), eye.camera("main"))
-        self.plan = plan_targets(self.surface, self._excavator_settings.zones)
+        self.plan = plan_targets(self.surface, self._excavator_settings.zones, self._clearing.vain_w)
 
     def _begin_cycle(self, target_id: int) -> None:
         count = len(self.plan.proposals)

@@ -42,6 +42,10 @@ LEAST_SWEPT_M3 = 0.03
 LEAST_SEEN_SHARE = 0.5
 """Part of the cut's cells that has to be seen (kind: guess)."""
 
+VAIN_COST_M3 = 1.0
+"""What a cycle that brought nothing costs the places around it [m3]: more than any of them can gain, so they come after
+all others, and before nothing at all (kind: derived)."""
+
 KEEP_OUT_RADIUS_M = 2.0
 """How far towards the machine the bucket may go while it cuts or is drawn in; a keep-out zone bars all of it [m]."""
 
@@ -60,6 +64,7 @@ class Candidates:
         onset_m: Length of the cut after which loading has begun [m]; infinite if it does not.
         seen_share: Part of the cut's cells that is seen.
         is_barred: Whether a keep-out zone bars it.
+        vain_tries: Number of cycles on a region that overlaps its own which brought nothing.
         score: How good it is [m3].
     """
 
@@ -69,6 +74,7 @@ class Candidates:
     onset_m: NDArray[np.float64]
     seen_share: NDArray[np.float64]
     is_barred: NDArray[np.bool_]
+    vain_tries: NDArray[np.intp]
     score: NDArray[np.float64]
 
     @property
@@ -78,18 +84,28 @@ class Candidates:
         return np.asarray(worth & (self.seen_share >= LEAST_SEEN_SHARE) & ~self.is_barred)
 
 
-def find_candidates(surface: SeenSurface, keep_out: Sequence[Zone] = ()) -> Candidates:
+def find_candidates(
+    surface: SeenSurface, keep_out: Sequence[Zone] = (), vain_w: Sequence[NDArray[np.float64]] = ()
+) -> Candidates:
     """Imagine a cut at every cell within reach."""
     x_w, y_w = np.meshgrid(surface.x_w, surface.y_w, indexing="ij")
     centers_w = np.stack([x_w, y_w, surface.heights_m], axis=-1).reshape(-1, 3)
     radius = np.hypot(*(centers_w[:, :2] - np.asarray(MACHINE_POS_W[:2])).T)
     low, high = RADIUS_RANGE_M
     centers_w = centers_w[(low <= radius) & (radius <= high)]
-    return rate(centers_w, surface, keep_out)
+    return rate(centers_w, surface, keep_out, vain_w)
 
 
-def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequence[Zone] = ()) -> Candidates:
-    """Imagine a cut at given places (n, 3) [m], whoever proposes them."""
+def rate(
+    centers_w: NDArray[np.float64],
+    surface: SeenSurface,
+    keep_out: Sequence[Zone] = (),
+    vain_w: Sequence[NDArray[np.float64]] = (),
+) -> Candidates:
+    """Imagine a cut at given places (n, 3) [m], whoever proposes them.
+
+    `vain_w` are the centres (3,) [m] of regions on which cycles brought nothing.
+    """
     offset = centers_w[:, :2] - np.asarray(MACHINE_POS_W[:2])
     radius, swing = np.hypot(*offset.T), np.arctan2(offset[:, 1], offset[:, 0])
     gone = np.arange(0.0, CUT_LENGTH_M, _STEP_M)
@@ -103,6 +119,8 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
     begun = swept_m3 >= ONSET_M3
     onset_m = np.where(begun.any(axis=1), begun.argmax(axis=1) * _STEP_M, np.inf)
     filled_m = (swept_m3 < total_m3[:, None] - 1e-9).sum(axis=1) * _STEP_M
+    vain_tries = _vain_tries(centers_w, vain_w)
+    gain_m3 = total_m3 - LENGTH_COST_M2 * filled_m - RADIUS_COST_M2 * radius + HEIGHT_GAIN_M2 * centers_w[:, 2]
     return Candidates(
         centers_w=centers_w,
         radius_m=radius,
@@ -110,8 +128,16 @@ def rate(centers_w: NDArray[np.float64], surface: SeenSurface, keep_out: Sequenc
         onset_m=onset_m,
         seen_share=(seen * is_cut).sum(axis=1) / np.maximum(is_cut.sum(axis=1), 1),
         is_barred=is_barred(centers_w, keep_out, inner_radius_m=KEEP_OUT_RADIUS_M, half_size_m=0.5 * PATCH_SIZE_M),
-        score=total_m3 - LENGTH_COST_M2 * filled_m - RADIUS_COST_M2 * radius + HEIGHT_GAIN_M2 * centers_w[:, 2],
+        vain_tries=vain_tries,
+        score=gain_m3 - VAIN_COST_M3 * vain_tries,
     )
+
+
+def _vain_tries(centers_w: NDArray[np.float64], vain_w: Sequence[NDArray[np.float64]]) -> NDArray[np.intp]:
+    tries = np.zeros(len(centers_w), dtype=np.intp)
+    for place_w in vain_w:
+        tries += np.hypot(*(centers_w[:, :2] - place_w[:2]).T) < PATCH_SIZE_M
+    return tries
 
 
 def _along_the_cut(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.tasks.planner.candidates import (
@@ -18,6 +19,8 @@ from lerobot_excav.envs.tasks.planner.zones import Zone
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M, Target
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE
 
+_REASONS = ("swept_m3", "onset_m", "radius_m", "seen_share", "vain_tries", "score")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
@@ -29,6 +32,7 @@ class Proposal:
         onset_m: Length of the cut after which loading begins [m].
         radius_m: Distance from the swing axis [m].
         seen_share: Part of the cut that is seen.
+        vain_tries: Number of cycles here that brought nothing.
         score: How good it is among all places [m3].
     """
 
@@ -37,13 +41,13 @@ class Proposal:
     onset_m: float
     radius_m: float
     seen_share: float
+    vain_tries: float
     score: float
 
     @property
     def reason(self) -> dict[str, float]:
         """What speaks for it, rounded, as it goes into files."""
-        names = ("swept_m3", "onset_m", "radius_m", "seen_share", "score")
-        return {name: round(float(getattr(self, name)), 4) for name in names}
+        return {name: round(float(getattr(self, name)), 4) for name in _REASONS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,13 +70,16 @@ class Plan:
         return tuple(proposal.target for proposal in self.proposals)
 
 
-def plan_targets(surface: SeenSurface, keep_out: Sequence[Zone] = ()) -> Plan:
-    """Choose the regions with the most soil within a cut; the same surface gives the same plan.
+def plan_targets(
+    surface: SeenSurface, keep_out: Sequence[Zone] = (), vain_w: Sequence[NDArray[np.float64]] = ()
+) -> Plan:
+    """Choose the regions with the most soil within a cut; the same arguments give the same plan.
 
     The best possible place comes first, then the best of those that lie apart from all before, and so on. Zones of
-    `keep_out` bar the regions that they touch, and those whose cut path they do.
+    `keep_out` bar the regions that they touch, and those whose cut path they do. `vain_w` are the centres (3,) [m] of
+    regions on which cycles brought nothing: regions that overlap them come after all others, the least tried first.
     """
-    candidates = find_candidates(surface, keep_out)
+    candidates = find_candidates(surface, keep_out, vain_w)
     free, chosen = candidates.is_possible.copy(), list[int]()
     while free.any() and len(chosen) < TARGETS_PER_SCENE:
         best = int(np.argmax(np.where(free, candidates.score, -np.inf)))
@@ -85,8 +92,7 @@ def plan_targets(surface: SeenSurface, keep_out: Sequence[Zone] = ()) -> Plan:
 
 def _proposal(candidates: Candidates, index: int) -> Proposal:
     center_w = candidates.centers_w[index].copy()
-    names = ("swept_m3", "onset_m", "radius_m", "seen_share", "score")
-    reasons = {name: float(getattr(candidates, name)[index]) for name in names}
+    reasons = {name: float(getattr(candidates, name)[index]) for name in _REASONS}
     return Proposal(target=Target(center_w=center_w, yaw_rad=cylinder_from_world(center_w)[1]), **reasons)
 
 

@@ -80,6 +80,15 @@ def test_cycles_that_bring_nothing_time_out_and_the_episode_ends_after_the_last(
     assert metrics["is_success"] is False
 
 
+@pytest.mark.usefixtures("short_cycles")
+def test_a_region_that_brought_nothing_is_not_commanded_in_the_next_cycle(env):
+    env.reset(options={"scene_id": 3})
+    cycles = play(env, 30)[-1][4]["episode_metrics"]["cycles"]
+    first_w, second_w, third_w = (np.array(cycle["region_w"])[:2] for cycle in cycles)
+    assert min(np.hypot(*(second_w - first_w)), np.hypot(*(third_w - first_w)), np.hypot(*(third_w - second_w))) >= 0.8
+    assert [cycle["reason"]["vain_tries"] for cycle in cycles] == [0, 0, 0]
+
+
 def test_a_time_limit_within_a_cycle_leaves_it_unfinished():
     env = ClearEnv(**CHEAP, episode_length=3)
     env.reset(seed=1)

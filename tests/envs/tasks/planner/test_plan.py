@@ -37,7 +37,7 @@ def test_proposals_are_ranked_in_reach_apart_and_worth_it(scene_id):
     for proposal in plan.proposals:
         assert proposal.swept_m3 >= LEAST_SWEPT_M3
         assert proposal.onset_m <= LONGEST_ONSET_M
-        assert set(proposal.reason) == {"swept_m3", "onset_m", "radius_m", "seen_share", "score"}
+        assert set(proposal.reason) == {"swept_m3", "onset_m", "radius_m", "seen_share", "vain_tries", "score"}
 
 
 @settings(max_examples=10, deadline=None)
@@ -117,3 +117,27 @@ def test_a_zone_between_region_and_machine_bars_it():
     place_w = np.array([[1.0, 0.0, 0.3]])
     for zone, barred in (((-1.5, -0.1, -1.0, 0.1), True), ((-1.5, 0.5, -1.0, 0.6), False), ((1.5, -1, 2, 1), False)):
         assert is_barred(place_w, [zone], inner_radius_m=2.5, half_size_m=0.4).tolist() == [barred]
+
+
+@settings(max_examples=15, deadline=None)
+@given(scenes, st.integers(1, 4))
+def test_regions_that_brought_nothing_come_after_all_others_and_the_least_tried_of_them_first(scene_id, tries):
+    surface = surface_of_scene("train", scene_id)
+    first = plan_targets(surface)
+    vain_w = [first.targets[0].center_w] * tries
+    plan = plan_targets(surface, vain_w=vain_w)
+    away_m = np.hypot(*(centers(plan)[:, :2] - vain_w[0][:2]).T)
+    assert [proposal.vain_tries for proposal in plan.proposals] == [tries if m < 0.8 else 0 for m in away_m]
+    assert away_m[0] >= 0.8
+    everywhere = [*plan.candidates.centers_w[::7], *vain_w]
+    again = plan_targets(surface, vain_w=everywhere)
+    counts = again.candidates.vain_tries[again.candidates.is_possible]
+    assert again.proposals[0].vain_tries == counts.min()
+
+
+def test_a_pile_that_was_tried_in_vain_all_over_is_still_worth_a_cycle():
+    surface = surface_of_scene("train", 0)
+    first = plan_targets(surface)
+    again = plan_targets(surface, vain_w=list(first.candidates.centers_w))
+    assert again.nothing_left is None
+    assert (again.candidates.is_possible == first.candidates.is_possible).all()
