@@ -15,7 +15,7 @@ SHARED = {
     **{"frames": 200, "fps": 10, "episode_length": 200, "is_success": True},
 }
 SCOOP = {
-    **{"simulation_version": 6, "task": "Scoop-v0", "soil": "sand", "fidelity": "standard", "target_success": True},
+    **{"simulation_version": 5, "task": "Scoop-v0", "soil": "sand", "fidelity": "standard", "target_success": True},
     **{"retained_mass_kg": 300.0, "residual_bucket_mass_kg": 1.5, "hard_target_contacts": 0},
     **{"spill_before_target_events": 0, "loading_onset_time_s": None},
 }

@@ -165,7 +165,7 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
         ({"episode_length": 100}, "time limits: 100 and 200"),
         ({"soil": "gravel"}, "soils: gravel and sand"),
         ({"fidelity": "fine"}, "fidelities: fine and standard"),
-        ({"simulation_version": 1}, "versions of the simulation: 1 and 6"),
+        ({"simulation_version": 1}, "versions of the simulation: 1 and 5"),
     ],
 )
 def test_a_run_does_not_mix_conditions(make_run, scoop_line, changes, message):

@@ -144,6 +144,6 @@ def test_continuing_with_another_setting_names_it(tmp_path, changes, message):
 def test_a_run_of_another_version_of_the_simulation_is_not_continued(tmp_path):
     evaluate(tmp_path / "o.jsonl.partial")
     partial = tmp_path / "o.jsonl.partial"
-    partial.write_text(partial.read_text().replace('"simulation_version": 6', '"simulation_version": 1'))
-    with pytest.raises(ConfigurationError, match="simulation_version=1, not 6"):
+    partial.write_text(partial.read_text().replace('"simulation_version": 5', '"simulation_version": 1'))
+    with pytest.raises(ConfigurationError, match="simulation_version=1, not 5"):
         evaluate(tmp_path / "o.jsonl", resume=True)

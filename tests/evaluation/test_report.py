@@ -59,11 +59,11 @@ def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, scoop_l
 @pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
 def test_runs_whose_scenes_differ_stand_side_by_side_but_are_not_related(runs, make_run, scoop_line, changes):
     other = make_run("other", [scoop_line(i, **changes) for i in range(10)])
-    with pytest.raises(DatasetError, match=r"half dug sand in version 6 .* and other dug"):
+    with pytest.raises(DatasetError, match=r"half dug sand in version 5 .* and other dug"):
         make_report(runs[:1], operator=other)
     report = make_report([runs[0], other])
     assert report.differences == {}
-    assert "no paired differences to other: half dug sand in version 6" in report_text(report)
+    assert "no paired differences to other: half dug sand in version 5" in report_text(report)
 
 
 def test_commands_may_change_at_other_frames_in_every_episode(make_run, grasp_line):
@@ -79,6 +79,6 @@ def test_the_text_names_soil_fidelity_and_version(make_run, scoop_line):
     runs = [make_run(soil, [scoop_line(0, soil=soil)]) for soil in ("sand", "gravel")]
     text = report_text(make_report(runs))
     assert "| gravel | gravel | correct" in text
-    assert "- Simulation: version 6, standard fidelity of the soil." in text
+    assert "- Simulation: version 5, standard fidelity of the soil." in text
     runs.append(make_run("fine", [scoop_line(0, fidelity="fine")]))
-    assert "fine: version 6, fine fidelity of the soil" in report_text(make_report(runs))
+    assert "fine: version 5, fine fidelity of the soil" in report_text(make_report(runs))

@@ -52,7 +52,7 @@ SCOOP = TaskSpec(
     duration_s=20.0,  # kind: paper
     storage="image",
     settings=ExcavatorSettings,
-    simulation_version=6,
+    simulation_version=5,
     changes={
         1: "soil in the bucket as one volume, ballistic parcels; dig regions hidden from the main view were possible",
         2: "soil in the bucket as parcels in contact, hence other loads, forces and flows; every scene redrawn, with "
@@ -62,9 +62,7 @@ SCOOP = TaskSpec(
         4: "slopes at the limit come to rest within seconds, piles of scenes lie a little steeper; what has come loose "
         "has no cohesion, and parcels pack as they are weighed; a spill is a lifted load that is lost before the box",
         5: "the operator that digs up to later stages, and the planner that points it and Clear-v0, dig nearer to the "
-        "machine and scrape thin soil; soil, machine and scenes are those of version 4",
-        6: "Clear-v0 commands a region on which a cycle brought nothing only after all others; all else is that of "
-        "version 5",
+        "machine and scrape thin soil, and Clear-v0 commands a region that brought nothing only after all others; soil, machine and scenes are those of version 4",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",

@@ -1,0 +1,1 @@
+"""A local web page from which a person points and drives, and its server; knows no simulation."""

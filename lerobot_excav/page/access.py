@@ -1,0 +1,72 @@
+"""Who may open the page: whoever knows the token, from this machine unless other hosts were asked for."""
+
+import hmac
+import ipaddress
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+COOKIE = "excav_token"
+"""Holds the token once the page was opened with it, so that it leaves the address bar."""
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Access:
+    """What a request has to show.
+
+    Attributes:
+        host: Address that the server listens at; one of loopback lets no other machine in.
+        port: Its port.
+        token: What the address of the page has to hold.
+    """
+
+    host: str
+    port: int
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
+
+    @property
+    def address(self) -> str:
+        """Address of the page, with the token."""
+        host = "127.0.0.1" if self.host in ("0.0.0.0", "::") else self.host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/?token={self.token}"
+
+    def knows_token(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
+        """Tell whether a request knows the token, from the address or from an earlier visit."""
+        given = query.get("token") or cookies.get(COOKIE, "")
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+    def is_for_us(self, headers: Mapping[str, str]) -> bool:
+        """Tell whether a request was meant for this server and comes from its own page.
+
+        A page of someone else may lead a browser here by a name of its own (DNS rebinding), or talk to this server over
+        a socket, which browsers allow: names that are not ours, and origins other than the page itself, are refused.
+        """
+        host = headers.get("host", "")
+        if not self._is_our_name(host):
+            return False
+        origin = headers.get("origin")
+        return origin is None or urlsplit(origin).netloc == host
+
+    def _is_our_name(self, host: str) -> bool:
+        name, _, port = host.rpartition(":")
+        if port != str(self.port):
+            return False
+        if name in LOOPBACK or name.strip("[]") == self.host:
+            return True
+        return not is_loopback(self.host) and _is_address(name.strip("[]"))
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether an address reaches this machine alone."""
+    return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,97 @@
+"""One page drives, the others look on."""
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+from lerobot_excav.page.sticks import Sticks
+from lerobot_excav.page.wishes import ResponseMessage, Wish
+
+MOST_WISHES = 100
+"""Wishes that wait at most; more come only from a program (kind: guess)."""
+
+
+@dataclass(kw_only=True)
+class Response:
+    """How the sticks of the driving page answer; see the teleoperator of the same names."""
+
+    pattern: str = "iso"
+    dead_zone: float = 0.08
+    expo: float = 0.0
+    invert: tuple[str, ...] = ()
+
+
+@dataclass(kw_only=True)
+class DriversSeat:
+    """Who drives, with which sticks, and what was wished for; used from the server's thread and from the one that plays.
+
+    Attributes:
+        sticks: Sticks of the page that drives.
+        response: How they answer.
+        delay_ms: From stick to picture, as that page measured it last [ms]; None before.
+    """
+
+    sticks: Sticks = field(default_factory=Sticks)
+    response: Response = field(default_factory=Response)
+    delay_ms: float | None = None
+    _driver: int | None = None
+    _wishes: deque[Wish] = field(default_factory=lambda: deque(maxlen=MOST_WISHES))
+    _lock: threading.RLock = field(default_factory=threading.RLock)
+
+    @property
+    def driver(self) -> int | None:
+        """Number of the page that drives."""
+        return self._driver
+
+    def take(self, page: int, *, force: bool = False) -> bool:
+        """Give the controls to a page, if nobody has them or it insists; tell whether it has them now."""
+        with self._lock:
+            if self._driver is None or (force and self._driver != page):
+                self._driver = page
+                self._reset()
+            return self._driver == page
+
+    def leave(self, page: int) -> None:
+        """Take the controls from a page, if it has them: what it said last counts no more, and its wishes neither."""
+        with self._lock:
+            if self._driver == page:
+                self._driver = None
+                self._reset()
+
+    def report(self, page: int, axes: list[float], number: int, *, lost: bool) -> None:
+        """Take in where the sticks of a page are."""
+        with self._lock:
+            if self._driver == page:
+                self.sticks.report(axes, number, time.monotonic())
+                if lost:
+                    self.sticks.let_go()
+
+    def respond(self, page: int, message: ResponseMessage) -> None:
+        """Set how the sticks answer."""
+        with self._lock:
+            if self._driver == page:
+                values = message.model_dump(exclude={"kind", "invert"})
+                self.response = Response(invert=tuple(message.invert), **values)
+
+    def wish(self, page: int, wish: Wish) -> None:
+        """Put a wish of a page down; those of pages that look on are left out."""
+        with self._lock:
+            if self._driver == page:
+                self._wishes.append(wish)
+
+    def wishes(self) -> list[Wish]:
+        """Take what has been wished for since the last call."""
+        with self._lock:
+            wishes = list(self._wishes)
+            self._wishes.clear()
+            return wishes
+
+    def axes(self) -> tuple[dict[str, float], int]:
+        """Return where the sticks are, as far as it counts, and the number of the message that said so."""
+        with self._lock:
+            return self.sticks.axes(time.monotonic()), self.sticks.number
+
+    def _reset(self) -> None:
+        self.sticks, self.delay_ms = Sticks(), None
+        self._wishes.clear()
