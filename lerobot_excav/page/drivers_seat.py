@@ -24,7 +24,7 @@ class Response:
 
 @dataclass(kw_only=True)
 class DriversSeat:
-    """Who drives, with which sticks, and what was wished for; used from the server's thread and from the one that plays.
+    """Who drives, with which sticks, and what was wished for; shared by the server's thread and the one that plays.
 
     Attributes:
         sticks: Sticks of the page that drives.

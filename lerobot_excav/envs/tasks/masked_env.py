@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
-from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.overlay import tinted
-from lerobot_excav.envs.masks.source import Pixels, TargetMask, make_mask_source
+from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
+from lerobot_excav.envs.tasks.commanded import CommandedEnv
 from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
-from lerobot_excav.envs.tasks.settings import SCENE_SETS, RenderSettings
-from lerobot_excav.envs.tasks.watched import WatchedEnv
-from lerobot_excav.errors import ConfigurationError, require_choice
+from lerobot_excav.envs.tasks.settings import RenderSettings
+from lerobot_excav.errors import require_choice
 from lerobot_excav.setting import declared_settings
 
 RENDER_MODES = ("rgb_array", None)
@@ -26,11 +24,8 @@ RENDER_MODES = ("rgb_array", None)
 NO_TARGET = -1
 """What stands for none of the targets where an index is expected."""
 
-MASK_MISSING_LIMIT_S = 10.0
-"""How long a machine is held still while its mask source finds nothing [s]; then the episode is over (kind: guess)."""
 
-
-class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any], NDArray[Any]]):
+class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, Any], NDArray[Any]]):
     """A machine in a scene, and a target that a mask of the main view commands.
 
     A task is a subclass that says how a scene begins, how a frame passes, what the targets are and what is measured.
@@ -86,12 +81,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
         )
         self._ticks_per_frame = TICKS_PER_SECOND // self.fps
-        self._source = CorruptedSource(
-            make_mask_source(self.settings.mask_source),
-            condition=self.settings.mask_condition,
-            noise=self.settings.mask_noise,
-            noise_px=self.settings.mask_noise_px,
-        )
+        self._source = self._named_source = self._corrupted(make_mask_source(self.settings.mask_source))
         self._world: World | None = None
         self._renderer: Picture | None = None
         self._selection: Selection | None = None
@@ -113,26 +103,6 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     @abstractmethod
     def _start(self, selection: Selection) -> None:
         """Reset the world to a scene, and begin the task on one of its targets; until then there is no episode."""
-
-    @abstractmethod
-    def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
-        """Pass a frame; return the reward, and whether the task is over.
-
-        Raises:
-            ConfigurationError: The action has another shape or is not finite.
-        """
-
-    @abstractmethod
-    def holding_action(self) -> NDArray[Any]:
-        """Return the action that holds the machine still."""
-
-    @abstractmethod
-    def _region(self, target_id: int) -> Any:
-        """Return the target of the scene with this index, as the task knows it."""
-
-    @abstractmethod
-    def true_mask(self, command: Command) -> Pixels:
-        """Return which pixels of `main` show the target of a command once the machine is gone, (H, W) bool."""
 
     @property
     @abstractmethod
@@ -158,18 +128,6 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
     def _measures(self) -> dict[str, Any]:
         """Return the outcome part by part, as it goes into the metrics file."""
 
-    def _next_target(self) -> int | None:
-        """Return the target that the task commands from this frame on; None leaves the command as it is."""
-        return None
-
-    def _begin_command(self, target_id: int) -> None:
-        """Take note that another target is commanded."""
-
-    @property
-    def _target_count(self) -> int:
-        """How many targets can be commanded now."""
-        return self.task_spec.target_count
-
     # What every task shares.
 
     @property
@@ -187,39 +145,9 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
         return self._renderer
 
     @property
-    def command(self) -> Command:
-        """What is commanded now.
-
-        Raises:
-            ConfigurationError: The environment has not been reset.
-        """
-        self._require_episode()
-        return self._commands[-1]
-
-    @property
-    def commands(self) -> tuple[Command, ...]:
-        """All commands of the episode, the first at frame 0."""
-        return tuple(self._commands)
-
-    @property
     def time_s(self) -> float:
         """Simulated time since the start of the episode [s]."""
         return (self._frame + self._missing_frames) / self.fps
-
-    @property
-    def scene_id(self) -> int:
-        """Scene of the running episode."""
-        return self._require_episode().scene_id
-
-    @property
-    def stage(self) -> int:
-        """Cycles that a seeded operator had dug before the start of the running episode."""
-        return self._require_episode().stage
-
-    @property
-    def target_id(self) -> int:
-        """Index of the target that is commanded now."""
-        return self.command.target_id
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -274,75 +202,7 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             self._renderer.close()
             self._renderer = self._main_img = None
 
-    # What a mask source may look at.
-
-    @property
-    def camera(self) -> PinholeCamera:
-        """Where the main camera stands, and how it projects."""
-        return self.renderer.camera("main")
-
-    @property
-    def scene_key(self) -> tuple[int, ...]:
-        """Numbers of the scene set and of the scene, and of what a task tells apart within it."""
-        return SCENE_SETS.index(self.settings.scene_set), self.scene_id, *((self.stage,) if self.stage else ())
-
-    def picture(self) -> NDArray[np.uint8]:
-        """Return the main picture, (H, W, 3) uint8; drawn once per frame, for mask sources ask for it again."""
-        if self._main_img is None:
-            self._main_img = self.renderer.render("main")
-        return self._main_img.copy()
-
-    def depth_m(self) -> NDArray[np.float32]:
-        """Return the depth image registered with `main`, (H, W) float32 [m along the optical axis]."""
-        return self.renderer.depth_m("main")
-
-    def other_commands(self) -> list[Command]:
-        """Return what else could be commanded in this scene, in the order of the targets."""
-        others = (i for i in range(self._target_count) if i != self.target_id)
-        return [Command(target_id=i, region=self._region(i), since_frame=self._frame) for i in others]
-
-    # The command and its mask.
-
-    @property
-    def mask(self) -> TargetMask | None:
-        """The mask of the command, as shown; None if nothing was found, or pictures are left out."""
-        return self._mask
-
-    @property
-    def mask_missing(self) -> bool:
-        """Whether nothing was found for the command, so that no action is carried out."""
-        return self._shows_pixels and self._mask is None
-
-    def _give_command(self, target_id: int) -> None:
-        command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
-        self._commands.append(command)
-        self._mask = self._source.mask(self, command) if self._shows_pixels else None
-
-    def _change_command(self) -> None:
-        """Give the next command if it is time for one."""
-        schedule = self._require_episode().schedule
-        target_id = self._next_target() if schedule is None else dict(schedule).get(self._frame)
-        if target_id is not None:
-            self._begin_command(target_id)
-            self._give_command(target_id)
-
-    def _wait_for_mask(self) -> tuple[float, bool]:
-        """Hold the machine still until there is a mask, within limits; return the reward, and whether it is over."""
-        reward, terminated, left = 0.0, False, self.episode_length - self._frame - self._missing_frames
-        patience = min(left, round(MASK_MISSING_LIMIT_S * self.fps))
-        while self.mask_missing and not terminated and patience > 0:
-            gain, terminated = self._advance(self.holding_action())
-            reward, patience = reward + gain, patience - 1
-            self._missing_frames += 1
-            self._main_img = None
-            self._mask = self._source.mask(self, self.command)
-        return reward, terminated
-
     # What is shown and told.
-
-    @property
-    def _shows_pixels(self) -> bool:
-        return self.obs_type == "pixels_agent_pos"
 
     def _observe(self) -> dict[str, Any]:
         state = {"environment_state": self.environment_state} if self.obs_type == "state" else {}
@@ -392,8 +252,3 @@ class MaskedTaskEnv[World, Picture: Renderer](WatchedEnv, gym.Env[dict[str, Any]
             "frames": self._frame,
             **self._measures(),
         }
-
-    def _require_episode(self) -> Selection:
-        if self._selection is None:
-            raise ConfigurationError("the environment has no episode yet; call reset() first")
-        return self._selection

@@ -7,7 +7,7 @@ from toy_reach.table import draw_spots
 
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import TargetMask, register_mask_source
-from lerobot_excav.envs.tasks.masked_env import MASK_MISSING_LIMIT_S
+from lerobot_excav.envs.tasks.commanded import MASK_MISSING_LIMIT_S
 from lerobot_excav.errors import ConfigurationError
 
 STILL = np.zeros(2, np.float32)

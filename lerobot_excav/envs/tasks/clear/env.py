@@ -10,7 +10,8 @@ from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
-from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets
+from lerobot_excav.envs.tasks.planner.candidates import rate
+from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets, proposal_of
 from lerobot_excav.envs.tasks.planner.score_overlay import with_scores
 from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
@@ -142,6 +143,15 @@ class ClearEnv(ExcavatorEnv):
         else:
             require(target_id < self._target_count, f"commands: target {target_id} is not proposed at this time")
             self._clearing.recommand(target_id, self.plan.proposals[target_id])
+
+    @override
+    def _target_at(self, place_w: NDArray[np.float64]) -> int:
+        """Let the planner rate a place that somebody else proposes, beside its own proposals."""
+        target_id = super()._target_at(place_w)
+        rated = rate(place_w[None], self.surface, self._excavator_settings.zones, self._clearing.vain_w)
+        require(not rated.is_barred[0], f"keep_out={self._excavator_settings.keep_out!r} bars this place")
+        self.plan = replace(self.plan, proposals=(*self.plan.proposals, proposal_of(rated, 0)))
+        return target_id
 
     @property
     @override

@@ -1,6 +1,6 @@
 """The FR5 arm among four blocks as a gymnasium environment."""
 
-from typing import Any, cast
+from typing import Any, cast, override
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,10 @@ from lerobot_excav.envs.tasks.grasp.settings import FR5Settings
 from lerobot_excav.envs.tasks.grasp.task import GraspTask
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Selection
+from lerobot_excav.errors import require
+
+BLOCK_REACH_M = 0.05
+"""From the middle of a block; what is farther away is no part of it [m] (derived: its half diagonal)."""
 
 _RETARGET_STREAM = 0x4E77  # names the random streams from which the second target is drawn
 
@@ -120,6 +124,13 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
 
     def _begin_command(self, target_id: int) -> None:
         self.grasp.retarget(target_id)
+
+    @override
+    def _target_at(self, place_w: NDArray[np.float64]) -> int:
+        """Return the block at a place."""
+        away_m = np.linalg.norm(self.workcell.block_pos_w - place_w, axis=1)
+        require(float(away_m.min()) <= BLOCK_REACH_M, "there is no block at this place; point at one of the four")
+        return int(away_m.argmin())
 
     def true_mask(self, command: Command) -> Pixels:
         """Return the pixels that show the block, (H, W) bool.

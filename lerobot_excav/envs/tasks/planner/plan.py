@@ -86,11 +86,12 @@ def plan_targets(
         chosen.append(best)
         away_m = np.hypot(*(candidates.centers_w[:, :2] - candidates.centers_w[best, :2]).T)
         free &= away_m >= LEAST_DISTANCE_M
-    proposals = tuple(_proposal(candidates, index) for index in chosen)
+    proposals = tuple(proposal_of(candidates, index) for index in chosen)
     return Plan(proposals=proposals, candidates=candidates, nothing_left=None if chosen else _why_none(candidates))
 
 
-def _proposal(candidates: Candidates, index: int) -> Proposal:
+def proposal_of(candidates: Candidates, index: int) -> Proposal:
+    """Return one of the candidates as a proposal, with what speaks for it."""
     center_w = candidates.centers_w[index].copy()
     reasons = {name: float(getattr(candidates, name)[index]) for name in _REASONS}
     return Proposal(target=Target(center_w=center_w, yaw_rad=cylinder_from_world(center_w)[1]), **reasons)

@@ -1,12 +1,14 @@
 """The excavator as a gymnasium environment."""
 
-from dataclasses import astuple
-from typing import Any, cast
+from dataclasses import astuple, replace
+from typing import Any, cast, override
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.machines.excavator.control import checked_action
+from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.machines.excavator.viewing import WorksiteView
@@ -25,6 +27,10 @@ from lerobot_excav.errors import require
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
 FULL_BUCKET_KG = 485.0
+
+POINTABLE_RADIUS_M = (2.6, 6.4)
+"""Distance from the swing axis at which a person may command a region [m]: the planner's, and 0.2 to 0.3 m more (kind:
+guess)."""
 
 
 class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
@@ -155,6 +161,23 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     @property
     def _target_count(self) -> int:
         return len(self.scene.targets)
+
+    @override
+    def places_w(self) -> NDArray[np.float64]:
+        """Return the points (H, W, 3) [m] of the soil behind the pixels of `main`, machine or not; NaN beside it."""
+        return self.renderer.terrain_points_w()
+
+    @override
+    def _target_at(self, place_w: NDArray[np.float64]) -> int:
+        """Make a region around a place of the ground a further target of the scene."""
+        radius_m, (low_m, high_m) = float(np.hypot(*(place_w[:2] - MACHINE_POS_W[:2]))), POINTABLE_RADIUS_M
+        require(
+            low_m <= radius_m <= high_m,
+            f"this place is {radius_m:.1f} m from the swing axis; the bucket digs from {low_m} to {high_m} m",
+        )
+        region = Target(center_w=place_w.copy(), yaw_rad=cylinder_from_world(place_w)[1])
+        self.cycle.scene = replace(self.scene, targets=(*self.scene.targets, region))
+        return len(self.scene.targets) - 1
 
     def true_mask(self, command: Command) -> Pixels:
         """Return the pixels whose soil surface point lies in the patch, (H, W) bool."""

@@ -62,7 +62,8 @@ SCOOP = TaskSpec(
         4: "slopes at the limit come to rest within seconds, piles of scenes lie a little steeper; what has come loose "
         "has no cohesion, and parcels pack as they are weighed; a spill is a lifted load that is lost before the box",
         5: "the operator that digs up to later stages, and the planner that points it and Clear-v0, dig nearer to the "
-        "machine and scrape thin soil, and Clear-v0 commands a region that brought nothing only after all others; soil, machine and scenes are those of version 4",
+        "machine and scrape thin soil, and Clear-v0 commands a region that brought nothing only after all others; "
+        "soil, machine and scenes are those of version 4",
     },
     env_entry="lerobot_excav.envs.tasks.scoop.env:ExcavatorEnv",
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",

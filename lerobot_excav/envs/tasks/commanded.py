@@ -1,0 +1,275 @@
+"""A command and its mask: what a machine is to act on, as a source of masks shows it in the main view."""
+
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.machines.pinhole import PinholeCamera
+from lerobot_excav.envs.machines.renderer import Renderer
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.pointed import PointedSource
+from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask
+from lerobot_excav.envs.tasks.selection import Selection
+from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.envs.tasks.task import TaskSpec
+from lerobot_excav.envs.tasks.watched import WatchedEnv
+from lerobot_excav.errors import ConfigurationError, require, require_integer
+
+MASK_MISSING_LIMIT_S = 10.0
+"""How long a machine is held still while its mask source finds nothing [s]; then the episode is over (kind: guess)."""
+
+
+class CommandedEnv(WatchedEnv):
+    """An environment whose machine is to obey a command; a person may point elsewhere while it works."""
+
+    task_spec: TaskSpec
+    obs_type: str
+    fps: int
+    episode_length: int
+
+    _selection: Selection | None
+    _commands: list[Command]
+    _mask: TargetMask | None
+    _named_source: MaskSource  # the one that the settings name
+    _source: MaskSource  # of the present command
+    _frame: int
+    _missing_frames: int
+    _main_img: NDArray[np.uint8] | None
+
+    # What a task says of itself.
+
+    @property
+    @abstractmethod
+    def renderer(self) -> Renderer:
+        """Camera pictures of the world."""
+
+    @abstractmethod
+    def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
+        """Pass a frame; return the reward, and whether the task is over.
+
+        Raises:
+            ConfigurationError: The action has another shape or is not finite.
+        """
+
+    @abstractmethod
+    def _observe(self) -> dict[str, Any]:
+        """Return the observation as it is now."""
+
+    @abstractmethod
+    def holding_action(self) -> NDArray[Any]:
+        """Return the action that holds the machine still."""
+
+    @abstractmethod
+    def _region(self, target_id: int) -> Any:
+        """Return the target of the scene with this index, as the task knows it."""
+
+    @abstractmethod
+    def true_mask(self, command: Command) -> Pixels:
+        """Return which pixels of `main` show the target of a command once the machine is gone, (H, W) bool."""
+
+    def _target_at(self, place_w: NDArray[np.float64]) -> int:
+        """Return the target at a place (3,) [m], which may become a further one.
+
+        Raises:
+            ConfigurationError: There is none, and none can be made.
+        """
+        raise ConfigurationError(f"{self.task_spec.id} cannot be pointed at a place; command one of its targets")
+
+    def places_w(self) -> NDArray[np.float64]:
+        """Return the points (H, W, 3) [m] that the pixels of `main` show, world frame; NaN where there is none."""
+        return self.camera.points_w(self.depth_m())
+
+    def _next_target(self) -> int | None:
+        """Return the target that the task commands from this frame on; None leaves the command as it is."""
+        return None
+
+    def _begin_command(self, target_id: int) -> None:
+        """Take note that another target is commanded."""
+
+    @property
+    def _target_count(self) -> int:
+        """How many targets can be commanded now."""
+        return self.task_spec.target_count
+
+    # What is commanded.
+
+    @property
+    def scene_id(self) -> int:
+        """Scene of the running episode."""
+        return self._require_episode().scene_id
+
+    @property
+    def stage(self) -> int:
+        """Cycles that a seeded operator had dug before the start of the running episode."""
+        return self._require_episode().stage
+
+    @property
+    def command(self) -> Command:
+        """What is commanded now.
+
+        Raises:
+            ConfigurationError: The environment has not been reset.
+        """
+        self._require_episode()
+        return self._commands[-1]
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """All commands of the episode, the first at frame 0."""
+        return tuple(self._commands)
+
+    @property
+    def target_id(self) -> int:
+        """Index of the target that is commanded now."""
+        return self.command.target_id
+
+    # What a mask source may look at.
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """Where the main camera stands, and how it projects."""
+        return self.renderer.camera("main")
+
+    @property
+    def scene_key(self) -> tuple[int, ...]:
+        """Numbers of the scene set and of the scene, and of what a task tells apart within it."""
+        return SCENE_SETS.index(self.settings.scene_set), self.scene_id, *((self.stage,) if self.stage else ())
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the main picture, (H, W, 3) uint8; drawn once per frame, for mask sources ask for it again."""
+        if self._main_img is None:
+            self._main_img = self.renderer.render("main")
+        return self._main_img.copy()
+
+    def depth_m(self) -> NDArray[np.float32]:
+        """Return the depth image registered with `main`, (H, W) float32 [m along the optical axis]."""
+        return self.renderer.depth_m("main")
+
+    def other_commands(self) -> list[Command]:
+        """Return what else could be commanded in this scene, in the order of the targets."""
+        others = (i for i in range(self._target_count) if i != self.target_id)
+        return [Command(target_id=i, region=self._region(i), since_frame=self._frame) for i in others]
+
+    # The command and its mask.
+
+    @property
+    def mask(self) -> TargetMask | None:
+        """The mask of the command, as shown; None if nothing was found, or pictures are left out."""
+        return self._mask
+
+    @property
+    def mask_missing(self) -> bool:
+        """Whether nothing was found for the command, so that no action is carried out."""
+        return self._shows_pixels and self._mask is None
+
+    def _give_command(self, target_id: int, source: MaskSource | None = None) -> None:
+        """Command a target, shown by the source that the settings name unless by another."""
+        command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
+        self._commands.append(command)
+        self._source = source or self._named_source
+        self._mask = self._source.mask(self, command) if self._shows_pixels else None
+
+    def _change_command(self) -> None:
+        """Give the next command if it is time for one."""
+        schedule = self._require_episode().schedule
+        target_id = self._next_target() if schedule is None else dict(schedule).get(self._frame)
+        if target_id is not None:
+            self._begin_command(target_id)
+            self._give_command(target_id)
+
+    def _wait_for_mask(self) -> tuple[float, bool]:
+        """Hold the machine still until there is a mask, within limits; return the reward, and whether it is over."""
+        reward, terminated, left = 0.0, False, self.episode_length - self._frame - self._missing_frames
+        patience = min(left, round(MASK_MISSING_LIMIT_S * self.fps))
+        while self.mask_missing and not terminated and patience > 0:
+            gain, terminated = self._advance(self.holding_action())
+            reward, patience = reward + gain, patience - 1
+            self._missing_frames += 1
+            self._main_img = None
+            self._mask = self._source.mask(self, self.command)
+        return reward, terminated
+
+    # Pointing, while an episode runs.
+
+    def recommand(self, target_id: int) -> dict[str, Any]:
+        """Command another target from the next action on; return what is observed now, with its mask.
+
+        Raises:
+            ConfigurationError: There is no such target now, or no episode runs.
+            MaskMissingError: The mask source does not find it; the command stays as it was.
+        """
+        self._require_running()
+        require_integer("target_id", target_id, 0, self._target_count - 1)
+        return self._point(target_id, self._named_source)
+
+    def point_at(self, x: float, y: float) -> dict[str, Any]:
+        """Command what the main picture shows at a place, from its upper left corner (0, 0) to its lower right (1, 1).
+
+        Returns what is observed now. On ground that is to be dug, the place becomes a further target of the scene.
+
+        Raises:
+            ConfigurationError: There is nothing to act on, or no episode runs.
+            MaskMissingError: The mask source does not find it; the command stays as it was.
+        """
+        self._require_running()
+        places_w = self.places_w()
+        height, width = places_w.shape[:2]
+        place_w = places_w[min(int(y * height), height - 1), min(int(x * width), width - 1)]
+        require(
+            bool(np.isfinite(place_w).all()), f"at x={x:.2f}, y={y:.2f} of the main picture there is nothing to act on"
+        )
+        return self._point(self._target_at(place_w), self._named_source)
+
+    def point_with(self, pixels: Pixels) -> dict[str, Any]:
+        """Command what a mask (H, W) of the main picture covers, by that mask; return what is observed now.
+
+        The target, by which success is judged, is the one in its middle.
+
+        Raises:
+            ConfigurationError: The mask has another size, covers nothing to act on, or no episode runs.
+        """
+        self._require_running()
+        size = self.settings.observation_size
+        require(
+            pixels.shape == size and pixels.dtype == np.bool_,
+            f"a mask of shape {pixels.shape} and type {pixels.dtype} was given; give {size} of bool",
+        )
+        covered_w = self.places_w()[pixels]
+        covered_w = covered_w[np.isfinite(covered_w).all(axis=-1)]
+        require(len(covered_w) > 0, "the mask covers nothing to act on; mark soil, or a block")
+        return self._point(self._target_at(covered_w.mean(axis=0)), self._corrupted(PointedSource(pixels)))
+
+    def _point(self, target_id: int, source: MaskSource) -> dict[str, Any]:
+        last, source_before = self._commands[-1], self._source
+        self._begin_command(target_id)
+        self._give_command(target_id, source)
+        if self.mask_missing:
+            self._begin_command(last.target_id)
+            self._give_command(last.target_id, source_before)
+            raise MaskMissingError(f"mask_source={self.settings.mask_source!r} does not find target {target_id}")
+        if last.since_frame == self._frame:  # nothing was done under the command before
+            self._commands.remove(last)
+        return self._observe()
+
+    def _corrupted(self, source: MaskSource) -> MaskSource:
+        """Return a source under the condition and with the noise of the settings."""
+        settings = self.settings
+        return CorruptedSource(
+            source, condition=settings.mask_condition, noise=settings.mask_noise, noise_px=settings.mask_noise_px
+        )
+
+    def _require_running(self) -> None:
+        self._require_episode()
+        require(not self.is_over, "the episode is over; call reset() first")
+
+    @property
+    def _shows_pixels(self) -> bool:
+        return self.obs_type == "pixels_agent_pos"
+
+    def _require_episode(self) -> Selection:
+        if self._selection is None:
+            raise ConfigurationError("the environment has no episode yet; call reset() first")
+        return self._selection
