@@ -23,7 +23,7 @@ LAYERS = [
             "envs.tasks",
             "envs",
         ),
-        *("robots", "teleoperators", "datasets", "evaluation", "scripts"),
+        *("page", "robots", "teleoperators", "datasets", "evaluation", "console", "scripts"),
     ],
     ["policies"],
 ]

@@ -5,21 +5,12 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
+from lerobot_excav.envs.tasks.sticks import StickResponse
 from lerobot_excav.page.sticks import Sticks
 from lerobot_excav.page.wishes import ResponseMessage, Wish
 
 MOST_WISHES = 100
 """Wishes that wait at most; more come only from a program (kind: guess)."""
-
-
-@dataclass(kw_only=True)
-class Response:
-    """How the sticks of the driving page answer; see the teleoperator of the same names."""
-
-    pattern: str = "iso"
-    dead_zone: float = 0.08
-    expo: float = 0.0
-    invert: tuple[str, ...] = ()
 
 
 @dataclass(kw_only=True)
@@ -33,7 +24,7 @@ class DriversSeat:
     """
 
     sticks: Sticks = field(default_factory=Sticks)
-    response: Response = field(default_factory=Response)
+    response: StickResponse = field(default_factory=StickResponse)
     delay_ms: float | None = None
     _driver: int | None = None
     _wishes: deque[Wish] = field(default_factory=lambda: deque(maxlen=MOST_WISHES))
@@ -72,7 +63,7 @@ class DriversSeat:
         with self._lock:
             if self._driver == page:
                 values = message.model_dump(exclude={"kind", "invert"})
-                self.response = Response(invert=tuple(message.invert), **values)
+                self.response = StickResponse(invert=tuple(message.invert), **values)
 
     def wish(self, page: int, wish: Wish) -> None:
         """Put a wish of a page down; those of pages that look on are left out."""

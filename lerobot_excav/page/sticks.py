@@ -7,8 +7,7 @@ takes the controls with a stick held over would make the machine jump, so they c
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-AXES = ("left_x", "left_y", "right_x", "right_y")
-"""x is positive to the right, y positive towards the operator."""
+from lerobot_excav.envs.tasks.sticks import AXES
 
 STALE_S = 0.15
 """Age after which what the sticks said counts no more [s] (kind: guess; a page sends every 20 ms)."""

@@ -17,9 +17,6 @@ from lerobot_excav.datasets.record.episode import Episode
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 
-OPERATOR = "scripted"
-"""Who commands a demonstration."""
-
 # Encoding a picture releases the interpreter lock; two threads hide most of it behind the rest (measured).
 IMAGE_THREADS = 2
 
@@ -70,7 +67,7 @@ def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
 def constant_columns(episode: Episode, settings: TaskSettings, operator: str) -> dict[str, Any]:
     """Return the `excav.*` columns that are the same in every frame of an episode played with these settings.
 
-    The operator is one of `OPERATORS`; nobody took over.
+    The operator is one of `OPERATORS`. Nobody took over, unless the frames say so.
     """
     return {
         schema.SCENE_KEY: episode.pair.scene_id,
@@ -91,7 +88,7 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
     """Add an episode to a dataset that is being written."""
     constant = {
         key: value if isinstance(value, str | np.ndarray) else np.array([value])
-        for key, value in constant_columns(episode, settings.env, OPERATOR).items()
+        for key, value in constant_columns(episode, settings.env, episode.operator).items()
     }
     for frame in range(episode.length):
         varying = {
@@ -100,6 +97,7 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
             schema.TARGET_KEY: episode.target_id[frame : frame + 1],
             schema.COMMAND_KEY: episode.command_frame[frame : frame + 1],
             schema.TASK_STATE_KEY: episode.task_state[frame],
+            schema.INTERVENTION_KEY: episode.intervention[frame : frame + 1],
         }
         images = {schema.camera_key(camera): frames[frame] for camera, frames in episode.images.items()}
         dataset.add_frame({"task": episode.task, **constant, **varying, **images})

@@ -13,7 +13,7 @@ from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import Operator
 
-TRACES = ("state", "action", "target_id", "command_frame", "task_state")
+TRACES = ("state", "action", "target_id", "command_frame", "task_state", "intervention")
 """What an episode holds of every frame, besides pictures."""
 
 
@@ -30,11 +30,13 @@ class Episode:
         target_id: Target that is commanded, (n,) int64.
         command_frame: Frame from which on the command holds, (n,) int64.
         task_state: How far the task is, (n, k) float32.
+        intervention: Whether a person had taken over from a policy, (n,) bool.
         outcome: How far the task is after the last action, and after the rest, (k,) float32.
         rest_frames: How many frames the machine was held still after the last action until the episode ended.
         success: Outcome of the episode.
         mask_missing_frames: Frames in which the machine was held still because no mask was found.
         metrics: Outcome part by part, after the last action.
+        operator: Who commanded, one of `schema.OPERATORS`.
     """
 
     pair: Pair
@@ -45,16 +47,74 @@ class Episode:
     target_id: NDArray[Any]
     command_frame: NDArray[Any]
     task_state: NDArray[Any]
+    intervention: NDArray[Any]
     outcome: NDArray[Any]
     rest_frames: int
     success: bool
     mask_missing_frames: int
     metrics: dict[str, Any]
+    operator: str = "scripted"
 
     @property
     def length(self) -> int:
         """Number of frames."""
         return len(self.action)
+
+
+class EpisodeTape:
+    """Takes an episode down, frame by frame."""
+
+    def __init__(self) -> None:
+        self._frames: list[dict[str, Any]] = []
+        self._cameras: tuple[str, ...] = ()
+        self._success = False
+        self._metrics: dict[str, Any] = {}
+        self._info: dict[str, Any] = {}
+
+    @property
+    def length(self) -> int:
+        """Number of frames so far."""
+        return len(self._frames)
+
+    def add(
+        self, observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any], *, intervention: bool = False
+    ) -> None:
+        """Take down what is seen and told before an action, and the action; whether a person took over for it."""
+        pixels = observation.get("pixels", {})
+        self._cameras = tuple(pixels)
+        self._frames.append(
+            {
+                **pixels,
+                "state": np.asarray(observation["agent_pos"], dtype=np.float32),
+                "action": action,
+                "target_id": np.int64(info["target_id"]),
+                "command_frame": np.int64(info["command_frame"]),
+                "task_state": np.asarray(info["task_state"], dtype=np.float32),
+                "intervention": np.bool_(intervention),
+            }
+        )
+
+    def note(self, info: dict[str, Any]) -> None:
+        """Take down what is told after the last action."""
+        self._success = self._success or bool(info["is_success"])
+        self._metrics = info.get("episode_metrics", self._metrics)
+        self._info = info
+
+    def episode(self, pair: Pair, task: str, *, operator: str) -> Episode:
+        """Return the episode; it has a frame at least."""
+        columns = {key: np.stack([frame[key] for frame in self._frames]) for key in self._frames[0]}
+        return Episode(
+            pair=pair,
+            task=task,
+            images={camera: columns.pop(camera) for camera in self._cameras},
+            outcome=np.asarray(self._info["task_state"], dtype=np.float32),
+            rest_frames=0,
+            success=self._success,
+            mask_missing_frames=self._info["mask_missing_frames"],
+            metrics=dict(self._metrics),
+            operator=operator,
+            **columns,
+        )
 
 
 def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) -> Episode:
@@ -114,29 +174,14 @@ def _play(
     """Play until the episode ends, but at least and at most so many frames."""
     observation, info = env.reset(options=options)
     reset()
-    frames: list[dict[str, Any]] = []
-    metrics: dict[str, Any] = {}
-    success, ended = False, False
-    while len(frames) < least or (len(frames) < most and not ended):
-        action = np.asarray(act(len(frames)), dtype=np.float32)
-        frames.append(_frame(observation, info, action))
+    tape, ended = EpisodeTape(), False
+    while tape.length < least or (tape.length < most and not ended):
+        action = np.asarray(act(tape.length), dtype=np.float32)
+        tape.add(observation, info, action)
         observation, _, terminated, truncated, info = env.step(action)
+        tape.note(info)
         ended = terminated or truncated
-        success = success or bool(info["is_success"])
-        metrics = info.get("episode_metrics", metrics)
-    columns = {key: np.stack([frame[key] for frame in frames]) for key in frames[0]}
-    cameras = observation.get("pixels", {})
-    return Episode(
-        pair=pair,
-        task=env.task_description,
-        images={camera: columns.pop(camera) for camera in cameras},
-        outcome=np.asarray(info["task_state"], dtype=np.float32),
-        rest_frames=0,
-        success=success,
-        mask_missing_frames=info["mask_missing_frames"],
-        metrics=dict(metrics),
-        **columns,
-    )
+    return tape.episode(pair, env.task_description, operator="scripted")
 
 
 def _without_rest(episode: Episode, count: int) -> Episode:
@@ -144,14 +189,3 @@ def _without_rest(episode: Episode, count: int) -> Episode:
     traces = {name: getattr(episode, name)[:count] for name in TRACES}
     images = {camera: frames[:count] for camera, frames in episode.images.items()}
     return replace(episode, images=images, rest_frames=episode.length - count, **traces)
-
-
-def _frame(observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any]) -> dict[str, Any]:
-    return {
-        **observation.get("pixels", {}),
-        "state": np.asarray(observation["agent_pos"], dtype=np.float32),
-        "action": action,
-        "target_id": np.int64(info["target_id"]),
-        "command_frame": np.int64(info["command_frame"]),
-        "task_state": np.asarray(info["task_state"], dtype=np.float32),
-    }

@@ -40,6 +40,7 @@ class Outcome(TypedDict):
 
 
 _STORED = (*TRACES, "outcome", "rest_frames")
+_WORDS = ("task", "operator")
 
 _OUTCOME = TypeAdapter(Outcome)
 
@@ -150,7 +151,8 @@ def _damaged(path: Path) -> DatasetError:
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
-    arrays = {"task": np.array(episode.task), **{name: np.asarray(getattr(episode, name)) for name in _STORED}}
+    words = {name: np.array(getattr(episode, name)) for name in _WORDS}
+    arrays = {**words, **{name: np.asarray(getattr(episode, name)) for name in _STORED}}
     for camera, frames in episode.images.items():
         arrays[f"png:{camera}"], arrays[f"end:{camera}"] = _encode(frames)
     return arrays
@@ -163,7 +165,8 @@ def _frames(path: Path) -> dict[str, Any]:
     cameras = sorted({key.split(":")[1] for key in arrays if key.startswith("png:")})
     images = {camera: _decode(arrays[f"png:{camera}"], arrays[f"end:{camera}"]) for camera in cameras}
     stored = {name: arrays[name] for name in _STORED}
-    return {"task": str(arrays["task"]), "images": images, **stored, "rest_frames": int(stored["rest_frames"])}
+    words = {name: str(arrays[name]) for name in _WORDS}
+    return {**words, "images": images, **stored, "rest_frames": int(stored["rest_frames"])}
 
 
 def _encode(frames: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.acted_place import PlaceProbe
 from lerobot_excav.envs.tasks.settings import TARGETS_PER_SCENE, TaskSettings
+from lerobot_excav.envs.tasks.sticks import StickControl
 
 if TYPE_CHECKING:
     from lerobot_excav.envs.tasks.measures import TaskMeasures
@@ -63,6 +64,8 @@ class TaskSpec:
         measures_entry: The `TaskMeasures`.
         nearest_target_entry: Function from settings, scene and stage to the target that is nearest at the start, as
             the task understands it; None if the task defines no such thing.
+        sticks_entry: Class that says what two sticks mean to the machine, a `StickControl`; None if it cannot be driven
+            by them.
         place_probe_entry: Class that tells where the machine acts, a `PlaceProbe`; None if the task cannot be audited.
         task_state_tolerance: Deviation of a task state that a replay may have, in the state's own unit.
         judges_at_the_end: Whether success is judged at the time limit only, so that a replay must end there.
@@ -94,6 +97,7 @@ class TaskSpec:
     operator_entry: str
     measures_entry: str
     nearest_target_entry: str | None = None
+    sticks_entry: str | None = None
     place_probe_entry: str | None = None
     task_state_tolerance: float
     judges_at_the_end: bool
@@ -135,6 +139,12 @@ class TaskSpec:
         """Return the target that is nearest at the start of a scene, at a stage."""
         assert self.nearest_target_entry is not None  # what offers the choice checks it
         return int(resolve_name(self.nearest_target_entry)(settings, scene_id, stage))
+
+    def make_sticks(self) -> StickControl:
+        """Make what turns the sticks' axes into actions."""
+        assert self.sticks_entry is not None  # what offers sticks checks it
+        sticks: StickControl = resolve_name(self.sticks_entry)()
+        return sticks
 
     def make_place_probe(self, env: Any) -> PlaceProbe:
         """Make what tells where the machine acts, for an environment that was just reset."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
+from lerobot_excav.envs.tasks.sticks import AXES, PATTERN_NAMES
 from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, setting
-from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, PATTERNS
 
 BUTTONS = (
     *("a", "b", "x", "y", "back", "guide", "start"),
@@ -30,7 +30,7 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
     pattern: str = setting(
         "Control pattern: iso (left hand swing and arm, right hand boom and bucket) or sae (boom and arm change hands)",
         default="iso",
-        choices=tuple(PATTERNS),
+        choices=PATTERN_NAMES,
     )
     dead_zone: float = setting(
         "Deflection without effect; the rest is rescaled, so control starts without a step",

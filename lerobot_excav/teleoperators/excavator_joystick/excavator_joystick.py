@@ -4,11 +4,12 @@ from collections.abc import Callable
 from typing import override
 
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES
+from lerobot_excav.envs.tasks.scoop.sticks import joint_commands
+from lerobot_excav.envs.tasks.sticks import StickResponse
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import Gamepad, open_gamepad
-from lerobot_excav.teleoperators.excavator_joystick.mapping import joint_commands
 from lerobot_excav.teleoperators.simulation_teleoperator import SimulationTeleoperator
 
 
@@ -62,8 +63,11 @@ class ExcavatorJoystick(SimulationTeleoperator):
         if self._device is None:
             raise DeviceError("the gamepad is not connected; call connect() first.")
         axes, buttons = self._device.read()
-        response = {name: getattr(self.config, name) for name in ("pattern", "dead_zone", "expo", "invert")}
-        action = dict(zip(ACTION_NAMES, joint_commands(axes, **response).values(), strict=True))
+        config = self.config
+        response = StickResponse(
+            pattern=config.pattern, dead_zone=config.dead_zone, expo=config.expo, invert=tuple(config.invert)
+        )
+        action = dict(zip(ACTION_NAMES, joint_commands(axes, response).values(), strict=True))
         for button, key in zip(self.config.buttons, (REINITIALISE, NEXT_SCENE), strict=True):
             # A button that is down when the device is first read is held, not pressed.
             if buttons[button] and not self._was_down.get(button, True):

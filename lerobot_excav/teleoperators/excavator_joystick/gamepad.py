@@ -9,9 +9,9 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+from lerobot_excav.envs.tasks.sticks import AXES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
-from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES
 
 _FULL_DEFLECTION = 32767  # SDL reports controller axes as 16-bit integers
 

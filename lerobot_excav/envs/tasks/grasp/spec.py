@@ -44,6 +44,7 @@ GRASP = TaskSpec(
     operator_entry="lerobot_excav.envs.tasks.grasp.operator:GraspOperator",
     measures_entry="lerobot_excav.envs.tasks.grasp.measures:GRASP_MEASURES",
     nearest_target_entry="lerobot_excav.envs.tasks.grasp.nearest_block:nearest_target",
+    sticks_entry="lerobot_excav.envs.tasks.grasp.sticks:GraspSticks",
     place_probe_entry="lerobot_excav.envs.tasks.grasp.place_probe:TakenBlock",
     task_state_tolerance=1e-4,  # [m], or a count (kind: guess; the same build repeats exactly)
     judges_at_the_end=True,

@@ -69,6 +69,7 @@ SCOOP = TaskSpec(
     operator_entry="lerobot_excav.envs.tasks.scoop.operator:DigOperator",
     measures_entry="lerobot_excav.envs.tasks.scoop.measures:SCOOP_MEASURES",
     nearest_target_entry="lerobot_excav.envs.tasks.scoop.nearest_region:nearest_target",
+    sticks_entry="lerobot_excav.envs.tasks.scoop.sticks:DigSticks",
     place_probe_entry="lerobot_excav.envs.tasks.scoop.place_probe:DugPlace",
     task_state_tolerance=1e-2,  # [kg], [m], or a count (kind: guess; the same build repeats exactly)
     judges_at_the_end=False,

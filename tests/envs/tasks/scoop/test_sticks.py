@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.teleoperators.excavator_joystick.mapping import AXES, joint_commands, respond
+from lerobot_excav.envs.tasks.scoop.sticks import joint_commands
+from lerobot_excav.envs.tasks.sticks import AXES, StickResponse, respond
 
 deflections = st.floats(-1.5, 1.5)
 dead_zones = st.floats(0.0, 0.9)
@@ -52,8 +53,8 @@ def test_the_response_has_no_step_and_never_falls(value, dead_zone, expo, more):
 )
 def test_each_axis_drives_one_joint_and_centred_sticks_give_plain_zeros(pattern, axis, joint, sign):
     still = "{'swing': 0.0, 'boom': 0.0, 'arm': 0.0, 'bucket': 0.0}"
-    settings = {"pattern": pattern, "dead_zone": 0.08, "expo": 0.0}
     for invert, turned in (((), sign), ((axis,), -sign)):
-        command = joint_commands(CENTRED | {axis: 1.0}, invert=invert, **settings)
+        response = StickResponse(pattern=pattern, dead_zone=0.08, expo=0.0, invert=invert)
+        command = joint_commands(CENTRED | {axis: 1.0}, response)
         assert command == dict.fromkeys(command, 0.0) | {joint: float(turned)}
-        assert str(joint_commands(CENTRED, invert=invert, **settings)) == still
+        assert str(joint_commands(CENTRED, response)) == still
