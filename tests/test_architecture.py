@@ -146,7 +146,7 @@ def lacks_encoding(call):
         return name == "getoutput" or ("encoding" not in named and bool({"text", "universal_newlines"} & set(named)))
     if name in ("read_text", "write_text"):
         return "encoding" not in named
-    others = ("Image.open", "av.open", "os.open")
+    others = ("Image.open", "av.open", "os.open", "webbrowser.open")
     if name not in ("open", "NamedTemporaryFile", "fdopen") or ast.unparse(call.func) in others:
         return False
     is_path = isinstance(call.func, ast.Attribute) and name == "open"

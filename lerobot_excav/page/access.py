@@ -3,9 +3,12 @@
 import hmac
 import ipaddress
 import secrets
+import socket
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
+
+from lerobot_excav.errors import DeviceError
 
 COOKIE = "excav_token"
 """Holds the token once the page was opened with it, so that it leaves the address bar."""
@@ -70,3 +73,16 @@ def _is_address(host: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def free_port(host: str) -> int:
+    """Return a port of an address of this machine that nobody uses now.
+
+    Raises:
+        DeviceError: The address is not of this machine.
+    """
+    try:
+        with socket.create_server((host, 0)) as server:
+            return int(server.getsockname()[1])
+    except OSError as error:
+        raise DeviceError(f"--host={host} is no address of this machine; give another one, or leave it out") from error

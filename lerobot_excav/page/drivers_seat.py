@@ -83,6 +83,11 @@ class DriversSeat:
         with self._lock:
             return self.sticks.axes(time.monotonic()), self.sticks.number
 
+    def wants_controls(self) -> bool:
+        """Tell whether the person at the sticks wants to take over."""
+        with self._lock:
+            return self.sticks.take_over(time.monotonic())
+
     def _reset(self) -> None:
         self.sticks, self.delay_ms = Sticks(), None
         self._wishes.clear()

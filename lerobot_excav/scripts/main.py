@@ -17,6 +17,7 @@ COMMANDS = {
     "operator": "let the scripted operator play scenes, for the efficiency in reports",
     "report": "make the table of one or more evaluations, with intervals and comparisons",
     "audit": "ask whether a policy acts where its mask says because of the mask",
+    "console": "open a page to see, point, drive, let a policy work, and record",
     "export": "write a small copy of a trained policy, with a model card",
     "bench": "measure how fast this machine simulates and records",
     "warmup": "compile the simulation ahead of the first episode",

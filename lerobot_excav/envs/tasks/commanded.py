@@ -21,6 +21,9 @@ from lerobot_excav.errors import ConfigurationError, require, require_integer
 MASK_MISSING_LIMIT_S = 10.0
 """How long a machine is held still while its mask source finds nothing [s]; then the episode is over (kind: guess)."""
 
+Seen = tuple[dict[str, Any], dict[str, Any]]
+"""Observation and info."""
+
 
 class CommandedEnv(WatchedEnv):
     """An environment whose machine is to obey a command; a person may point elsewhere while it works."""
@@ -59,6 +62,10 @@ class CommandedEnv(WatchedEnv):
         """Return the observation as it is now."""
 
     @abstractmethod
+    def _info(self, *, is_over: bool) -> dict[str, Any]:
+        """Return what is told beside the observation."""
+
+    @abstractmethod
     def holding_action(self) -> NDArray[Any]:
         """Return the action that holds the machine still."""
 
@@ -95,6 +102,11 @@ class CommandedEnv(WatchedEnv):
         return self.task_spec.target_count
 
     # What is commanded.
+
+    @property
+    def frame(self) -> int:
+        """How many actions have been carried out in the running episode."""
+        return self._frame
 
     @property
     def scene_id(self) -> int:
@@ -194,8 +206,8 @@ class CommandedEnv(WatchedEnv):
 
     # Pointing, while an episode runs.
 
-    def recommand(self, target_id: int) -> dict[str, Any]:
-        """Command another target from the next action on; return what is observed now, with its mask.
+    def recommand(self, target_id: int) -> Seen:
+        """Command another target from the next action on; return observation and info as they are now.
 
         Raises:
             ConfigurationError: There is no such target now, or no episode runs.
@@ -205,10 +217,11 @@ class CommandedEnv(WatchedEnv):
         require_integer("target_id", target_id, 0, self._target_count - 1)
         return self._point(target_id, self._named_source)
 
-    def point_at(self, x: float, y: float) -> dict[str, Any]:
+    def point_at(self, x: float, y: float) -> Seen:
         """Command what the main picture shows at a place, from its upper left corner (0, 0) to its lower right (1, 1).
 
-        Returns what is observed now. On ground that is to be dug, the place becomes a further target of the scene.
+        Returns observation and info as they are now. On ground that is to be dug, the place becomes a further target of
+        the scene.
 
         Raises:
             ConfigurationError: There is nothing to act on, or no episode runs.
@@ -223,10 +236,10 @@ class CommandedEnv(WatchedEnv):
         )
         return self._point(self._target_at(place_w), self._named_source)
 
-    def point_with(self, pixels: Pixels) -> dict[str, Any]:
-        """Command what a mask (H, W) of the main picture covers, by that mask; return what is observed now.
+    def point_with(self, pixels: Pixels) -> Seen:
+        """Command what a mask (H, W) of the main picture covers, by that mask.
 
-        The target, by which success is judged, is the one in its middle.
+        Returns observation and info as they are now. The target, by which success is judged, is the one in its middle.
 
         Raises:
             ConfigurationError: The mask has another size, covers nothing to act on, or no episode runs.
@@ -242,7 +255,7 @@ class CommandedEnv(WatchedEnv):
         require(len(covered_w) > 0, "the mask covers nothing to act on; mark soil, or a block")
         return self._point(self._target_at(covered_w.mean(axis=0)), self._corrupted(PointedSource(pixels)))
 
-    def _point(self, target_id: int, source: MaskSource) -> dict[str, Any]:
+    def _point(self, target_id: int, source: MaskSource) -> Seen:
         last, source_before = self._commands[-1], self._source
         self._begin_command(target_id)
         self._give_command(target_id, source)
@@ -252,7 +265,7 @@ class CommandedEnv(WatchedEnv):
             raise MaskMissingError(f"mask_source={self.settings.mask_source!r} does not find target {target_id}")
         if last.since_frame == self._frame:  # nothing was done under the command before
             self._commands.remove(last)
-        return self._observe()
+        return self._observe(), self._info(is_over=False)
 
     def _corrupted(self, source: MaskSource) -> MaskSource:
         """Return a source under the condition and with the noise of the settings."""

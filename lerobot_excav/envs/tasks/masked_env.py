@@ -144,6 +144,10 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             self._renderer = self._make_renderer(self.world, *self.settings.observation_size)
         return self._renderer
 
+    def open_renderer(self, height: int, width: int) -> Picture:
+        """Return a further renderer of the world, with pictures of another size [px]; whoever asks for it closes it."""
+        return self._make_renderer(self.world, height, width)
+
     @property
     def time_s(self) -> float:
         """Simulated time since the start of the episode [s]."""

@@ -95,7 +95,7 @@ class WatchedEnv(ABC):
     def _draw_for_people(self, view: View) -> NDArray[np.uint8]:
         other = self._other_target_shown()
         view.mark(self._visible_target(self.target_id), shown=None if other is None else self._visible_target(other))
-        return captioned(view.render(self.render_settings.render_camera), self._caption())
+        return captioned(view.render(self.render_settings.render_camera), self.caption)
 
     def _begin_film(self, name: str) -> None:
         """Begin the film of an episode, if films are wanted.
@@ -126,11 +126,17 @@ class WatchedEnv(ABC):
         shown = None if self.mask is None else self.mask.target_id
         return None if shown == self.target_id else shown
 
-    def _caption(self) -> Caption:
+    @property
+    def caption(self) -> Caption:
+        """What a picture says of the episode now."""
         words = (*self._measured(), f"{self.time_s:.1f} s", *self.settings.mask_faults)
         if self.is_over and self.is_success:
             return Caption(words=words, outcome="success", is_success=True)
         return Caption(words=words, outcome=self._failure(), is_success=False)
+
+    def plan_view(self) -> NDArray[np.uint8] | None:
+        """Return a map of the scene from above, (H, W, 3) uint8, which costs little; None if the task draws none."""
+        return None
 
     def _close_views(self) -> None:
         """Free the graphics contexts of the views; the film of an episode that has not come to its end is left out."""

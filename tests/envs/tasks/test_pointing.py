@@ -40,7 +40,8 @@ def middle(pixels):
 def test_another_target_of_the_scene_is_commanded_from_the_next_action_on(env):
     env.reset(options={"scene_id": 2, "target_id": 0})
     env.step(STILL)
-    observation = env.recommand(1)
+    observation, info = env.recommand(1)
+    assert (info["target_id"], info["command_frame"]) == (1, 1)
     assert env.target_id == 1
     assert [(command.since_frame, command.target_id) for command in env.commands] == [(0, 0), (1, 1)]
     assert (shown(observation) == env.true_mask(env.command)).all()
@@ -59,7 +60,7 @@ def test_a_point_of_the_picture_becomes_a_region_around_it(env, x, y):
     env.reset(options={"scene_id": 2, "target_id": 0})
     env.step(STILL)
     count = len(env.scene.targets)
-    observation = env.point_at(x, y)
+    observation, _ = env.point_at(x, y)
     assert env.target_id == count
     at = middle(shown(observation))
     assert np.hypot(at[0] - x, at[1] - y) < 0.03
@@ -73,13 +74,13 @@ def test_a_painted_mask_is_shown_as_it_was_painted_and_judged_by_its_middle(env)
     env.reset(options={"scene_id": 2, "target_id": 0})
     pixels = np.zeros((96, 128), dtype=bool)
     pixels[50:58, 50:70] = True
-    observation = env.point_with(pixels)
+    observation, _ = env.point_with(pixels)
     assert (shown(observation) == pixels).all()
     assert env.mask.source == "pointed"
     covered_w = env.places_w()[pixels]
     np.testing.assert_allclose(env.target.center_w, covered_w.mean(axis=0), atol=1e-6)
     # What comes after it is the simulator's again.
-    assert (shown(env.recommand(0)) == env.true_mask(env.command)).all()
+    assert (shown(env.recommand(0)[0]) == env.true_mask(env.command)).all()
 
 
 @pytest.mark.parametrize(

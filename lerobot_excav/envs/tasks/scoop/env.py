@@ -18,6 +18,7 @@ from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
+from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
@@ -161,6 +162,11 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     @property
     def _target_count(self) -> int:
         return len(self.scene.targets)
+
+    @override
+    def plan_view(self) -> NDArray[np.uint8]:
+        """Return the dig area from above, the machine below it; see `plan_view.draw_plan`."""
+        return draw_plan(self.worksite, self.scene.targets, self.target_id)
 
     @override
     def places_w(self) -> NDArray[np.float64]:

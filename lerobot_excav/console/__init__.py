@@ -1,0 +1,1 @@
+"""The console: a person sees a machine, points, drives, lets a policy work, and records."""

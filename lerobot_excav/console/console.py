@@ -1,0 +1,214 @@
+"""The loop behind the page: time passes in it, wishes are granted, and every moment is shown."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.console.live_views import LiveViews
+from lerobot_excav.console.pilot import STILL, WORK, Pilot
+from lerobot_excav.console.recorder import Recorder
+from lerobot_excav.console.target_marks import target_marks
+from lerobot_excav.envs.tasks.commanded import Seen
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.errors import ExcavError
+from lerobot_excav.page.drivers_seat import DriversSeat
+from lerobot_excav.page.feed import Feed
+from lerobot_excav.page.wishes import Wish
+
+IDLE_FPS = 5
+"""Moments a second while time stands still (kind: guess)."""
+
+MOST_MARKS = 4
+"""Marks in the picture; places that people pointed at before are left out."""
+
+SHOWN_FPS = 10
+"""Pictures a second at most; drawing them takes 35 ms on a machine without a graphics card (kind: measured)."""
+
+
+class Console:
+    """Lets one page drive an environment in real time, and all pages see it.
+
+    Time stands still until somebody drives or a policy works. One frame is 1/fps s; where a frame takes longer than
+    that to compute, the world is slower than real time, and the page says by how much.
+
+    Args:
+        env: The environment, with pictures.
+        seat: Who drives.
+        feed: Where moments are published.
+        pilot: Who acts.
+        recorder: Takes episodes down.
+        grant: Does what a page wishes, or raises an `ExcavError` that says why not.
+        size: Height and width of the pictures [px].
+        speed: How fast the world is beside real time; below 1 it is slow motion.
+    """
+
+    def __init__(
+        self,
+        env: MaskedTaskEnv[Any, Any],
+        seat: DriversSeat,
+        feed: Feed,
+        *,
+        pilot: Pilot,
+        recorder: Recorder,
+        grant: Callable[["Console", Wish], None],
+        size: tuple[int, int],
+        speed: float = 1.0,
+    ) -> None:
+        self.env, self.seat, self.feed, self.pilot, self.recorder = env, seat, feed, pilot, recorder
+        self._grant, self._speed_asked = grant, speed
+        self._views = LiveViews(env, height=size[0], width=size[1])
+        self._words, self._is_fault = "", False
+        self._start: dict[str, int] | None = None  # of the running episode
+        self._pictures: dict[str, bytes] = {}
+        self._marks: list[dict[str, Any]] = []
+        self._is_new = True  # whether the scene looks otherwise than shown
+        self._shown_frame = 0
+        self._share = 1.0  # of the speed that is asked for, as far as this machine reaches it
+        self._acted: NDArray[np.float32] = np.zeros(len(env.task_spec.action_names), np.float32)
+
+    def start(self, **options: int) -> None:
+        """Begin an episode; `options` are those of the environment's `reset`.
+
+        Raises:
+            ConfigurationError: A value is not possible; the start before is shown again.
+        """
+        self.pilot.rest()
+        try:
+            self.observation, self.info = self.env.reset(options=dict(options))
+        except ExcavError:
+            if self._start is None:
+                raise
+            self.observation, self.info = self.env.reset(options=self._start)
+            self.look()
+            raise
+        self._start = dict(options)
+        self._shown_frame = 0
+        self.look()
+
+    def look(self, seen: Seen | None = None) -> None:
+        """Show the scene again, whose command or contents have changed; `seen` is observation and info."""
+        if seen is not None:
+            self.observation, self.info = seen
+        self._marks = target_marks(self.env)
+        self._views.redraw_plan()
+        self._is_new = True
+
+    def say(self, words: str, *, is_fault: bool = False) -> None:
+        """Tell the page something."""
+        self._words, self._is_fault = words, is_fault
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Serve until it is over."""
+        due_s = time.monotonic()
+        while not is_over():
+            has_passed = self.tick()
+            period_s = 1.0 / (self._speed_asked * self.env.fps if has_passed else IDLE_FPS)
+            due_s, now_s = due_s + period_s, time.monotonic()
+            if has_passed:
+                late_s = max(0.0, now_s - due_s)
+                self._share += 0.1 * (period_s / (period_s + late_s) - self._share)
+            due_s = max(due_s, now_s)  # what is lost is not made up for
+            self._wait_until(due_s)
+
+    def tick(self) -> bool:
+        """Grant what was wished for, let a frame pass if somebody acts, show the moment; tell whether one passed."""
+        self._grant_wishes()
+        has_passed = self._pass_frame()
+        self.show()
+        return has_passed
+
+    def close(self) -> None:
+        """Free the graphics context, and let go of the recording."""
+        self._views.close()
+        self.recorder.close()
+
+    def _wait_until(self, due_s: float) -> None:
+        while (left_s := due_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, 0.02))
+
+    def _grant_wishes(self) -> None:
+        for wish in self.seat.wishes():
+            self.say("")
+            try:
+                self._grant(self, wish)
+            except ExcavError as error:
+                self.say(str(error), is_fault=True)
+        if self.seat.driver is None and self.pilot.mode != STILL:
+            self.pilot.rest()
+            self.say("stopped: no page has the controls", is_fault=True)
+
+    def _pass_frame(self) -> bool:
+        """Let a frame pass if somebody acts; tell whether it did."""
+        if self.env.is_over or self.recorder.is_waiting_for_a_verdict:
+            self.pilot.rest()
+        mode = self.pilot.mode
+        action = self.pilot.act(self.observation)
+        if action is None:
+            return False
+        if self.pilot.mode != mode:
+            self.say("you have taken over; hand back, or drive on")
+        self.recorder.add(self.observation, self.info, action, by_policy=self.pilot.mode == WORK)
+        command_frame = self.info["command_frame"]
+        self.observation, _, terminated, truncated, self.info = self.env.step(action)
+        self._acted, self._is_new = action, True
+        self.recorder.note(self.info)
+        if terminated or truncated:
+            self.finish_episode()
+        elif self.info["command_frame"] != command_frame:
+            self.look()
+            if self.pilot.works_once:
+                self.pilot.rest()
+                self.say("the cycle is over; point where to dig next, or let the planner's choice stand")
+        return True
+
+    def finish_episode(self) -> None:
+        """End the episode in hand, as its outcome is now."""
+        self.pilot.rest()
+        self.recorder.finish(self.env.task_description, success=self.env.is_success)
+        caption = self.env.caption
+        self.say(f"the episode is over: {caption.outcome or 'not decided'}", is_fault=not self.env.is_success)
+
+    # What is shown.
+
+    def show(self) -> None:
+        """Publish the present moment."""
+        every = max(1, round(self.env.fps / SHOWN_FPS))
+        self._shown_frame += 1
+        if self._is_new and (self.pilot.mode == STILL or self._shown_frame % every == 0 or not self._pictures):
+            self._pictures, self._is_new = self._views.pictures(self.observation), False
+        self.feed.publish(self._state(), self._pictures)
+
+    def _state(self) -> dict[str, Any]:
+        env, spec, caption = self.env, self.env.task_spec, self.env.caption
+        axes, number = self.seat.axes()
+        return {
+            "task": spec.id,
+            "task_description": spec.description,
+            "scene": {"set": env.settings.scene_set, "scene_id": env.scene_id, "stage": env.stage},
+            "last_stage": spec.last_stage,
+            "mode": self.pilot.mode,
+            "policy": self.pilot.policy_name,
+            "taken_over": self.pilot.has_taken_over,
+            "ready": self.seat.sticks.is_ready,
+            "axes": axes,
+            "sticks_number": number,
+            "legend": self.pilot.legend,
+            "action": dict(zip(spec.action_names, np.round(self._acted, 3).tolist(), strict=True)),
+            "measured": list(caption.words),
+            "outcome": caption.outcome,
+            "success": caption.is_success,
+            "over": env.is_over,
+            "task_state": dict(zip(spec.task_state_names, np.round(env.task_state, 3).tolist(), strict=True)),
+            "targets": self._marks[:MOST_MARKS],
+            "target": env.target_id,
+            "mask_source": None if env.mask is None else env.mask.source,
+            "recording": self.recorder.state(),
+            "words": self._words,
+            "fault": self._is_fault,
+            "speed": round(self._speed_asked * self._share, 2),
+            "frame": env.frame,
+            "fps": env.fps,
+        }

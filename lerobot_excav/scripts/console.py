@@ -1,0 +1,90 @@
+"""Open a page in a browser: see the machine, point, drive, let a policy work, and record demonstrations.
+
+The page is served on this machine alone, at the address that is printed; it holds a token. A gamepad, two joysticks,
+keys (W A S D and the arrows) or the page's own sticks drive. With --out episodes are recorded as a LeRobot dataset, the
+same one that lerobot-record and `lerobot-excav index` make: every scene with all of its targets. After an interruption
+the same command goes on. Ctrl-C ends it.
+
+Examples:
+  lerobot-excav console --env.task=Clear-v0 --policy=checkpoints/excavator_mask_act
+      point at a place of the pile, and let the policy dig there; take over with the sticks at any moment
+  lerobot-excav console --scenes=2 --targets=4 --out=outputs/by_hand
+      record 8 paired demonstrations
+  lerobot-excav console --scenes=5 --stages=0,4 --out=outputs/stages
+      ... of piles as they are drawn and after 4 cycles
+  lerobot-excav console --env.type=fr5_grasp
+      the arm
+"""
+
+import webbrowser
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lerobot_excav.datasets.record.demonstration_settings import MOST_SCENES
+from lerobot_excav.envs.tasks.registry import task_settings
+from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE
+from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
+from lerobot_excav.setting import setting
+
+
+@dataclass(kw_only=True)
+class ConsoleArguments(Arguments):
+    """Arguments of `lerobot-excav console`."""
+
+    env: EnvironmentChoice = field(default_factory=EnvironmentChoice.default)
+    """Environment, with its settings; the excavator by default."""
+    policy: Path | None = setting("pretrained_model folder of a policy that may work", default=None)
+    first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
+    scenes: int = setting("How many scenes are recorded", default=2, low=1, high=MOST_SCENES)
+    targets: int | None = setting(
+        "Targets recorded per start; left out: 4, and 1 with a task that chooses its targets itself",
+        default=None,
+        choices=tuple(range(1, TARGETS_PER_SCENE + 1)),
+    )
+    stages: str = setting(
+        "Stages at which every scene is recorded, such as 0,4,8: after so many cycles dug before", default="0"
+    )
+    out: Path | None = setting("Folder of the dataset to record; left out: nothing is recorded", default=None)
+    host: str = setting(
+        "Address to listen at; another than 127.0.0.1 lets other machines in, which need the token too",
+        default="127.0.0.1",
+    )
+    port: int = setting("Port of the page; 0 takes a free one", default=8750, low=0, high=65535)
+    height: int = setting("Height of the live pictures [px]", default=480, low=96, high=1440)
+    width: int = setting("Width of the live pictures [px]", default=640, low=128, high=1920)
+    speed: float = setting("How fast the world is beside real time; 0.5 is half as fast", default=1.0, low=0.1, high=4)
+    open_browser: bool = setting("Whether to open the page in this machine's browser", default=False)
+
+
+def run(arguments: ConsoleArguments) -> int:
+    """Serve the page until Ctrl-C."""
+    from lerobot_excav.console.opening import open_console, until_interrupted
+    from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+    from lerobot_excav.page.access import Access, free_port
+
+    schedule = DemonstrationSettings(
+        env=task_settings(arguments.env),
+        first_scene=arguments.first_scene,
+        scenes=arguments.scenes,
+        targets=arguments.targets,
+        stages=arguments.stages,
+        keep_failures=True,  # whoever drives decides
+    )
+    access = Access(host=arguments.host, port=arguments.port or free_port(arguments.host))
+    size = (arguments.height, arguments.width)
+    with (
+        until_interrupted() as is_over,
+        open_console(
+            schedule, access=access, size=size, speed=arguments.speed, policy=arguments.policy, out=arguments.out
+        ) as opened,
+    ):
+        print(f"the console is at {opened.address}", flush=True)
+        print("Ctrl-C ends it.", flush=True)
+        if arguments.open_browser:
+            webbrowser.open(opened.address)
+        opened.console.run(is_over)
+    print("ended")
+    return 0
+
+
+ARGUMENTS = ConsoleArguments
