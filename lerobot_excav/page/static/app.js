@@ -38,6 +38,7 @@ async function drawPicture(name, blob) {
 /* Draw a moment; return the time from stick to picture [ms], or null if the sticks were not part of it. */
 async function showMoment(moment, pictures) {
   state = moment;
+  document.body.dataset.frame = state.frame;
   await Promise.all(Object.entries(pictures).map(([name, blob]) => drawPicture(name, blob)));
   await new Promise((resolve) => (document.hidden ? resolve() : requestAnimationFrame(resolve)));
   const main = $("view-main");

@@ -1,0 +1,211 @@
+"""What a person sees and does on the page, in a real browser."""
+
+import re
+import time
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from lerobot_excav.console import opening
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.page.sticks import LOST_S
+
+from ..console.conftest import Planted, axes_of
+from .conftest import serving
+
+DEAD_ZONE = 0.08
+"""That of the page, until a person sets another."""
+
+pytestmark = pytest.mark.slow
+
+
+def until(condition, limit_s=20.0):
+    deadline = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def state_of(served):
+    return served.console.feed._moment.state
+
+
+def brightness(page, canvas):
+    script = "c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let s = 0; "
+    script += "for (let i = 0; i < d.length; i += 4) s += d[i] + d[i+1] + d[i+2]; return s / (3 * d.length / 4); }"
+    return page.locator(canvas).evaluate(script)
+
+
+def undone(axes):
+    """Return deflections that the page's dead zone turns into the given axes."""
+    return [float(np.sign(a) * (DEAD_ZONE + (1.0 - DEAD_ZONE) * abs(a))) if abs(a) > 1e-6 else 0.0 for a in axes]
+
+
+def planned(served):
+    """Return the sticks, frame by frame, of the scripted operator in the scene that is shown."""
+    env = served.console.env
+    world = task_of_settings(env.settings).make_env(
+        obs_type="agent_pos", render_mode=None, **{**env.settings.as_dict(), "episode_length": None}
+    )
+    world.reset(options={"scene_id": env.scene_id, "stage": env.stage, "target_id": env.target_id})
+    operator = env.task_spec.make_operator(np.random.default_rng(0))
+    operator.reset(world)
+    plan, is_over = [], False
+    while not is_over:
+        action = operator.act(world)
+        plan.append(undone(axes_of(action)))
+        _, _, terminated, truncated, _ = world.step(action)
+        is_over = terminated or truncated
+    world.close()
+    moved = next(frame for frame, axes in enumerate(plan) if any(axes))
+    return plan[moved:]  # time stands still until the first motion
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 800)])
+def test_the_page_shows_views_targets_and_the_legend_of_the_sticks(open_page, tmp_path, scheme, width):
+    with serving() as served:
+        page = open_page(served, color_scheme=scheme, viewport={"width": width, "height": 900})
+        expect(page.locator("#driver")).to_have_text("you have the controls")
+        expect(page.locator("#scene")).to_contain_text("Scene 0 of train")
+        assert page.url == served.address.partition("?")[0]
+        for canvas in ("#view-main", "#view-view_0", "#view-policy", "#view-plan"):
+            assert brightness(page, canvas) > 15
+        expect(page.locator("#left text")).to_have_text(
+            [re.compile("swing *left"), re.compile("swing *right"), "arm out", "arm in"]
+        )
+        page.locator("summary").click()
+        page.locator("#pattern").select_option("sae")
+        expect(page.locator("#left text").nth(2)).to_have_text("boom down")
+        overflow = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        assert overflow <= 0
+        page.screenshot(path=tmp_path / f"{scheme}_{width}.png", full_page=True)
+
+
+def test_a_gamepad_drives_a_whole_cycle_as_the_operator_does(open_page):
+    with serving(speed=0.5) as served:
+        page = open_page(served, pad=True)
+        plan = planned(served)
+        expect(page.locator("#device")).to_have_text("Stub")
+        until(lambda: state_of(served)["ready"])
+        page.locator("#drive").click()
+        page.evaluate("plan => { window.plan = plan; }", plan)
+        until(lambda: state_of(served)["over"] or state_of(served)["frame"] > 2 * len(plan), limit_s=180.0)
+        assert state_of(served)["success"], state_of(served)["measured"]
+        expect(page.locator("#measured")).to_contain_text("success")
+        assert served.console.seat.delay_ms > 0.0
+
+
+def test_a_click_and_a_painted_region_are_commanded(open_page):
+    with serving() as served:
+        page = open_page(served)
+        overlay = page.locator("#overlay")
+        expect(page.locator("#driver")).to_have_text("you have the controls")
+        box = overlay.bounding_box()
+        target = next(t for t in state_of(served)["targets"] if t["number"] == 2)
+        overlay.click(position={"x": target["x"] * box["width"], "y": target["y"] * box["height"]})
+        until(lambda: state_of(served)["target"] == 2)
+        overlay.click(position={"x": 0.45 * box["width"], "y": 0.80 * box["height"]})
+        until(lambda: state_of(served)["target"] == 4)
+        page.get_by_label("paint a region").check()
+        page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.5 * box["height"], steps=5)
+        page.mouse.up()
+        until(lambda: state_of(served)["mask_source"] == "pointed")
+        rows, columns = np.nonzero(served.console.env.mask.pixels)
+        assert abs(rows.mean() / 96 - 0.5) < 0.02
+        assert abs(columns.mean() / 128 - 0.55) < 0.02
+        expect(page.locator("#words")).to_contain_text("painted")
+        assert overlay.bounding_box() == box  # the picture does not jump when the page says something
+
+
+def test_a_policy_works_keys_take_over_it_is_handed_back_and_stopped(open_page, monkeypatch, tmp_path):
+    monkeypatch.setattr(opening, "_policy", lambda checkpoint: Planted())
+    with serving(policy=tmp_path) as served:
+        page = open_page(served)
+        page.locator("#work").click()
+        expect(page.locator("#mode")).to_have_text("the policy works")
+        until(lambda: state_of(served)["frame"] > 3)
+        page.keyboard.down("KeyA")
+        expect(page.locator("#mode")).to_have_text("you drive, taken over")
+        until(lambda: state_of(served)["action"]["swing.vel"] == 1.0)
+        page.keyboard.up("KeyA")
+        until(lambda: state_of(served)["action"]["swing.vel"] == 0.0)
+        page.get_by_role("button", name="Hand back").click()
+        expect(page.locator("#mode")).to_have_text("the policy works")
+        page.keyboard.press("Space")
+        expect(page.locator("#mode")).to_have_text("time stands still")
+        frame = state_of(served)["frame"]
+        time.sleep(0.5)
+        assert state_of(served)["frame"] == frame
+
+
+def drive_left(page, served):
+    page.locator("#drive").click()
+    until(lambda: state_of(served)["mode"] == "drive" and state_of(served)["ready"])
+    page.evaluate("window.axes = [-1, 0, 0, 0]")
+    until(lambda: state_of(served)["action"]["swing.vel"] == -0.0 + 1.0)
+
+
+def test_a_pad_that_is_lost_lets_go_and_has_to_be_centred_when_it_is_back(open_page):
+    with serving() as served:
+        page = open_page(served, pad=True)
+        drive_left(page, served)
+        page.evaluate("window.kept = window.pads; window.pads = [];")
+        until(lambda: not state_of(served)["ready"])
+        page.evaluate("window.axes = [-1, 0, 0, 0]; window.pads = window.kept;")
+        time.sleep(0.5)
+        frame = state_of(served)["frame"]
+        expect(page.locator("#words")).to_contain_text("let go of the sticks")
+        time.sleep(0.5)
+        assert state_of(served)["frame"] == frame
+        page.evaluate("window.axes = [0, 0, 0, 0]")
+        until(lambda: state_of(served)["ready"])
+
+
+def test_a_page_that_is_hidden_lets_go(open_page):
+    with serving() as served:
+        page = open_page(served, pad=True)
+        drive_left(page, served)
+        page.evaluate("Object.defineProperty(document, 'hidden', {value: true, configurable: true});")
+        until(lambda: not state_of(served)["ready"], limit_s=10.0 * LOST_S)
+        assert state_of(served)["axes"]["left_x"] == 0.0
+
+
+def test_a_tab_that_is_closed_stops_the_machine_and_another_one_can_take_over(open_page, monkeypatch, tmp_path):
+    monkeypatch.setattr(opening, "_policy", lambda checkpoint: Planted())
+    with serving(policy=tmp_path) as served:
+        first, second = open_page(served), open_page(served)
+        expect(first.locator("#driver")).to_have_text("you have the controls")
+        expect(second.locator("#driver")).to_have_text("another page has the controls")
+        expect(second.locator("#drive")).to_be_disabled()
+        first.locator("#work").click()
+        until(lambda: state_of(served)["mode"] == "work")
+        first.close()
+        until(lambda: state_of(served)["mode"] == "still")
+        expect(second.locator("#driver")).to_have_text("nobody has the controls")
+        second.get_by_role("button", name="Take the controls").click()
+        expect(second.locator("#driver")).to_have_text("you have the controls")
+
+
+def test_a_wrong_token_shows_no_page_but_says_what_to_do(open_page):
+    with serving() as served:
+        page = open_page(served, path=served.address + "x")
+        expect(page.locator("body")).to_contain_text("open the address that the command printed")
+        page.wait_for_timeout(500)
+        open_page.faults.clear()  # the browser reports the refusal itself
+
+
+def test_the_arms_page_has_its_own_legend_and_no_map(open_page):
+    with serving("fr5_grasp") as served:
+        page = open_page(served)
+        expect(page.locator("#left text")).to_have_text(["left", "right", "away", "back"])
+        expect(page.locator("#plan")).to_be_hidden()
+        expect(page.locator("#stage-field")).to_be_hidden()
+        page.locator("#drive").click()
+        until(lambda: state_of(served)["ready"])
+        before = served.console.env.workcell.grasp_pos_w
+        page.keyboard.down("ArrowDown")  # towards the operator: up
+        until(lambda: served.console.env.workcell.grasp_pos_w[2] > before[2] + 0.02)
+        page.keyboard.up("ArrowDown")

@@ -1,0 +1,55 @@
+"""Eight paired demonstrations, recorded on the page, checked, and trained on."""
+
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+from playwright.sync_api import expect
+
+from lerobot_excav.datasets.check.quality_check import check_dataset
+
+from .conftest import serving
+from .test_page import state_of, until
+
+pytestmark = pytest.mark.slow
+
+TRAIN = (
+    *("--policy.type=mask_act", "--policy.preset=fast", "--policy.n_encoder_layers=1", "--policy.chunk_size=2"),
+    *("--policy.n_action_steps=1", "--policy.actions_per_token=1", "--policy.device=cpu", "--policy.push_to_hub=false"),
+    *("--batch_size=2", "--steps=20", "--num_workers=0", "--log_freq=10", "--eval_freq=0", "--save_checkpoint=false"),
+)
+
+
+def record_episode(page, served):
+    page.keyboard.press("KeyR")
+    until(lambda: state_of(served)["recording"]["running"])
+    page.keyboard.down("ArrowLeft")
+    until(lambda: state_of(served)["recording"]["frames"] >= 5)
+    page.keyboard.up("ArrowLeft")
+    page.keyboard.press("KeyF")
+    expect(page.locator("#judged")).to_be_visible()
+    page.keyboard.press("KeyK")
+    expect(page.locator("#judged")).to_be_hidden()
+
+
+def test_eight_paired_episodes_are_recorded_pass_qc_and_are_trained_on(open_page, tmp_path):
+    out = tmp_path / "by_hand"
+    with serving(out=out, scenes=2) as served:
+        page = open_page(served)
+        expect(page.locator("#driver")).to_have_text("you have the controls")
+        for number in range(8):
+            expect(page.locator("#next")).to_contain_text(f"{8 - number} of 8 left, {number} kept")
+            record_episode(page, served)
+        page.get_by_role("button", name="Write the dataset").click()
+        expect(page.locator("#next")).to_contain_text("written", timeout=120_000)
+    report = check_dataset(out, replays=8)
+    assert report.has_passed, report
+    index = pd.read_parquet(out / "meta" / "excav_pairs.parquet")
+    assert sorted(index["pair_uid"]) == [f"excavator/train/{s}/0/{t}" for s in range(2) for t in range(4)]
+    data = [f"--dataset.repo_id=local/{out.name}", f"--dataset.root={out}", f"--output_dir={tmp_path / 'train'}"]
+    trained = subprocess.run(
+        [sys.executable, "-m", "lerobot.scripts.lerobot_train", *data, *TRAIN],
+        capture_output=True, text=True, encoding="utf-8", check=False,
+    )  # fmt: skip
+    assert trained.returncode == 0, trained.stderr[-2000:]
