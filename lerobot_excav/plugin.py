@@ -9,7 +9,9 @@
 | robot | `fr5_sim` | `FR5SimConfig` |
 | teleoperator | `excavator_joystick` | `ExcavatorJoystickConfig` |
 | teleoperator | `excavator_operator` | `ExcavatorOperatorConfig` |
+| teleoperator | `excavator_web` | `ExcavatorWebConfig` |
 | teleoperator | `fr5_operator` | `FR5OperatorConfig` |
+| teleoperator | `fr5_web` | `FR5WebConfig` |
 
 Importing a configuration registers it. LeRobot finds the class that belongs to it when a command needs it,
 so no simulator is loaded here.
@@ -23,16 +25,20 @@ from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSim
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
+from lerobot_excav.teleoperators.excavator_web.config_excavator_web import ExcavatorWebConfig
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
+from lerobot_excav.teleoperators.fr5_web.config_fr5_web import FR5WebConfig
 
 __all__ = [
     "ExcavatorEnvConfig",
     "ExcavatorJoystickConfig",
     "ExcavatorOperatorConfig",
     "ExcavatorSimConfig",
+    "ExcavatorWebConfig",
     "FR5GraspEnvConfig",
     "FR5OperatorConfig",
     "FR5SimConfig",
+    "FR5WebConfig",
     "MaskACTConfig",
 ]
 

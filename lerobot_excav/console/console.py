@@ -7,22 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.console.live_views import LiveViews
 from lerobot_excav.console.pilot import STILL, WORK, Pilot
 from lerobot_excav.console.recorder import Recorder
-from lerobot_excav.console.target_marks import target_marks
 from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.errors import ExcavError
 from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed
+from lerobot_excav.page.live_views import LiveViews
+from lerobot_excav.page.scene_state import scene_state
+from lerobot_excav.page.target_marks import target_marks
 from lerobot_excav.page.wishes import Wish
 
 IDLE_FPS = 5
 """Moments a second while time stands still (kind: guess)."""
-
-MOST_MARKS = 4
-"""Marks in the picture; places that people pointed at before are left out."""
 
 SHOWN_FPS = 10
 """Pictures a second at most; drawing them takes 35 ms on a machine without a graphics card (kind: measured)."""
@@ -67,7 +65,7 @@ class Console:
         self._is_new = True  # whether the scene looks otherwise than shown
         self._shown_frame = 0
         self._share = 1.0  # of the speed that is asked for, as far as this machine reaches it
-        self._acted: NDArray[np.float32] = np.zeros(len(env.task_spec.action_names), np.float32)
+        self._acted: NDArray[np.float32] | None = None
 
     def start(self, **options: int) -> None:
         """Begin an episode; `options` are those of the environment's `reset`.
@@ -76,6 +74,7 @@ class Console:
             ConfigurationError: A value is not possible; the start before is shown again.
         """
         self.pilot.rest()
+        self._acted = None
         try:
             self.observation, self.info = self.env.reset(options=dict(options))
         except ExcavError:
@@ -182,33 +181,28 @@ class Console:
         self.feed.publish(self._state(), self._pictures)
 
     def _state(self) -> dict[str, Any]:
-        env, spec, caption = self.env, self.env.task_spec, self.env.caption
-        axes, number = self.seat.axes()
-        return {
-            "task": spec.id,
-            "task_description": spec.description,
-            "scene": {"set": env.settings.scene_set, "scene_id": env.scene_id, "stage": env.stage},
-            "last_stage": spec.last_stage,
+        scene = scene_state(self.env, self.seat, legend=self.pilot.legend, marks=self._marks, acted=self._acted)
+        return scene | {
             "mode": self.pilot.mode,
             "policy": self.pilot.policy_name,
             "taken_over": self.pilot.has_taken_over,
-            "ready": self.seat.sticks.is_ready,
-            "axes": axes,
-            "sticks_number": number,
-            "legend": self.pilot.legend,
-            "action": dict(zip(spec.action_names, np.round(self._acted, 3).tolist(), strict=True)),
-            "measured": list(caption.words),
-            "outcome": caption.outcome,
-            "success": caption.is_success,
-            "over": env.is_over,
-            "task_state": dict(zip(spec.task_state_names, np.round(env.task_state, 3).tolist(), strict=True)),
-            "targets": self._marks[:MOST_MARKS],
-            "target": env.target_id,
-            "mask_source": None if env.mask is None else env.mask.source,
             "recording": self.recorder.state(),
+            "offers": self._offers(),
             "words": self._words,
             "fault": self._is_fault,
             "speed": round(self._speed_asked * self._share, 2),
-            "frame": env.frame,
-            "fps": env.fps,
         }
+
+    def _offers(self) -> list[str]:
+        """Return which wishes the page may show at all."""
+        recording = ("record", "finish", "keep", "again", "skip", "complete") if self.recorder.recording else ()
+        return [
+            "point",
+            "paint",
+            "target",
+            "start",
+            "drive",
+            "stop",
+            *(["work"] if self.pilot.policy_name else []),
+            *recording,
+        ]

@@ -26,6 +26,7 @@ def grant(console: Console, wish: Wish) -> None:
     Raises:
         ExcavError: It is not possible now; the message says why.
     """
+    require(wish.kind in _GRANTS, f"the console does not know {wish.kind!r}")
     _GRANTS[wish.kind](console, wish)
 
 

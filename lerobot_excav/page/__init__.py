@@ -1,1 +1,1 @@
-"""A local web page from which a person points and drives, and its server; knows no simulation."""
+"""A local web page on which a person sees a machine, points and drives; knows no policy and no dataset."""

@@ -88,6 +88,11 @@ class DriversSeat:
         with self._lock:
             return self.sticks.take_over(time.monotonic())
 
+    def let_go(self) -> None:
+        """Forget where the sticks are, until they were centred again."""
+        with self._lock:
+            self.sticks.let_go()
+
     def _reset(self) -> None:
         self.sticks, self.delay_ms = Sticks(), None
         self._wishes.clear()

@@ -12,7 +12,7 @@ MOST_BYTES = 1_000_000
 
 
 WishKind = Literal[
-    "point", "paint", "target", "start", "drive", "work", "stop",
+    "point", "paint", "target", "start", "drive", "work", "stop", "next",
     "record", "finish", "keep", "again", "skip", "complete",
 ]  # fmt: skip
 
@@ -65,7 +65,7 @@ class Wish(_Message):
     """What whoever shows the page is asked to do, by the page that drives.
 
     Attributes:
-        kind: What; each console says which it knows.
+        kind: What; whoever shows the page says in each moment which it offers.
         x: Place in the main picture, from its left edge at 0 to its right edge at 1.
         y: The same from its upper edge.
         picture: A painted mask as PNG in base64: what is not black is meant.

@@ -1,1 +1,1 @@
-"""LeRobot teleoperators that drive the simulated machines: a gamepad, and the scripted operators."""
+"""LeRobot teleoperators that drive the simulated machines: a gamepad, a page in a browser, the scripted operators."""

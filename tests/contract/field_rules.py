@@ -27,7 +27,9 @@ from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.scripts.main import COMMANDS
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
+from lerobot_excav.teleoperators.excavator_web.config_excavator_web import ExcavatorWebConfig
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
+from lerobot_excav.teleoperators.fr5_web.config_fr5_web import FR5WebConfig
 
 ENDLESS, SEED = 2**31 - 1, 2**63 - 1
 CPU_LIMIT_S = 2.0
@@ -295,6 +297,7 @@ DEMOS = {
 }
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}
+PAGE = {"host": text, "port": whole(0, 65535), "height": whole(96, 1440), "width": whole(128, 1920)}
 COMMAND_TABLES = {
     "demos": {**DEMOS, **RESUMABLE, "out": optional(path)},
     "operator": {**SCENES, **RESUMABLE, "metrics": optional(path)},
@@ -324,6 +327,16 @@ COMMAND_TABLES = {
         **dict.fromkeys(("checkpoint", "against", "out"), optional(path)),
         **{"first_scene": whole(0, ENDLESS), "scenes": whole(1, 10_000), "stage": whole(0, 1000), **WORK},
         **{"n_action_steps": each(whole(1)), "ensemble": optional(number(-10, 10)), "seed": whole(0, SEED)},
+    },
+    "console": {
+        **dict.fromkeys(("policy", "out"), optional(path)),
+        **{
+            "first_scene": whole(0, ENDLESS).beside(scenes=1),
+            "scenes": whole(1, 100_000),
+            "targets": optional(whole(1, 4)),
+        },
+        "stages": Rule(lambda v: isinstance(v, str) and v != "", is_text=True),  # the environment decides
+        **{**PAGE, "speed": number(0.1, 4.0), "open_browser": flag},
     },
     "export": {
         **dict.fromkeys(("checkpoint", "out", "results"), optional(path)),
@@ -362,6 +375,8 @@ CONFIGURATIONS = {
     "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS)), "stage": whole(0, 0)}, {}),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),
     "excavator_operator": (ExcavatorOperatorConfig, {"seed": whole(0)}, {}),
+    "excavator_web": (ExcavatorWebConfig, PAGE, {}),
+    "fr5_web": (FR5WebConfig, PAGE, {}),
     "fr5_operator": (FR5OperatorConfig, {"seed": whole(0)}, {}),
     "soil": (SoilParameters, SOIL_TABLE, SAND),
     "demonstrations": (DemonstrationSettings, DEMOS, {"env": ExcavatorSettings()}),

@@ -204,6 +204,15 @@ class CommandedEnv(WatchedEnv):
             self._mask = self._source.mask(self, self.command)
         return reward, terminated
 
+    def observe(self) -> dict[str, Any]:
+        """Return the observation as it is now.
+
+        Raises:
+            ConfigurationError: The environment has not been reset.
+        """
+        self._require_episode()
+        return self._observe()
+
     # Pointing, while an episode runs.
 
     def recommand(self, target_id: int) -> Seen:

@@ -8,7 +8,7 @@ import { AXES, Sticks } from "./sticks.js";
 
 const SEND_MS = 20; // sticks are sent at 50 Hz
 const STOP_KEYS = ["Space", "Escape"];
-const WISH_KEYS = { KeyR: "record", KeyF: "finish", KeyK: "keep", KeyN: "again" };
+const WISH_KEYS = { KeyR: "record", KeyF: "finish", KeyK: "keep", KeyN: "again", KeyB: "restart", KeyX: "next-scene" }; // ids of buttons
 const PAD_WISHES = { 0: "work", 1: "stop", 9: "record" }; // A, B and Start of a gamepad
 const KEPT_MOMENTS = 400;
 
@@ -42,6 +42,7 @@ async function showMoment(moment, pictures) {
   await Promise.all(Object.entries(pictures).map(([name, blob]) => drawPicture(name, blob)));
   await new Promise((resolve) => (document.hidden ? resolve() : requestAnimationFrame(resolve)));
   const main = $("view-main");
+  pointing.isOffered = state.offers.includes("point") && isDriver();
   pointing.show(state.targets, state.target, [main.width, main.height]);
   showHeader();
   showGauges(state);
@@ -67,11 +68,14 @@ function showHeader() {
   $("words").textContent = waits ? "let go of the sticks: they count once they were centred" : state.words;
   $("words").classList.toggle("fault", state.fault && !waits);
   $("take").textContent = isDriver() ? "Give the controls up" : state.driver === "nobody" ? "Take the controls" : "Take them from the other page";
-  for (const button of document.querySelectorAll("[data-wish]")) button.disabled = !isDriver();
-  $("work").disabled = $("once").disabled = !isDriver() || !state.policy || state.over;
+  for (const part of document.querySelectorAll("[data-wish], [data-offer]")) {
+    part.hidden = !state.offers.includes(part.dataset.wish ?? part.dataset.offer);
+    if (part.dataset.wish) part.disabled = !isDriver();
+  }
+  $("work").disabled = $("once").disabled = !isDriver() || state.over;
   $("work").textContent = state.taken_over ? "Hand back" : "Let it work";
-  $("once").hidden = state.task.startsWith("Scoop") || !state.policy;
-  $("work").hidden = !state.policy;
+  if (!state.task.startsWith("Clear")) $("once").hidden = true;
+  if (state.recording) $("restart").hidden = true; // the recording has a button of its own
   $("drive").disabled = !isDriver() || state.over;
   $("plan").hidden = !state.pictures.some(([name]) => name === "plan");
   $("stage-field").hidden = !state.last_stage;
@@ -88,7 +92,9 @@ function sendSticks() {
   sent.set(number, performance.now());
   sent.delete(number - KEPT_MOMENTS);
   link.send({ kind: "sticks", axes, number, lost: sticks.takeLost() });
-  for (const button of sticks.takePressed()) if (button in PAD_WISHES) wish({ kind: PAD_WISHES[button] });
+  for (const button of sticks.takePressed()) {
+    if (state.offers.includes(PAD_WISHES[button])) wish({ kind: PAD_WISHES[button] });
+  }
 }
 
 function sendResponse() {
@@ -112,9 +118,9 @@ function onKey(event, isDown) {
   if (STOP_KEYS.includes(event.code)) {
     event.preventDefault();
     wish({ kind: "stop" });
-  } else if (event.code in WISH_KEYS && state.recording) {
+  } else if (event.code in WISH_KEYS) {
     const button = $(WISH_KEYS[event.code]);
-    if (!button.disabled && button.offsetParent) wish({ kind: WISH_KEYS[event.code] });
+    if (!button.disabled && button.offsetParent) wish({ kind: button.dataset.wish });
   }
 }
 

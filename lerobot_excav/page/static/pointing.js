@@ -8,6 +8,7 @@ export class Pointing {
     this.targets = [];
     this.paint = document.createElement("canvas");
     this.hasPaint = false;
+    this.isOffered = false; // whether anything may be commanded
     canvas.addEventListener("pointerdown", (event) => this.begin(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.end(event));
@@ -22,7 +23,7 @@ export class Pointing {
   }
 
   begin(event) {
-    if (this.tool !== "paint") return;
+    if (this.tool !== "paint" || !this.isOffered) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.paint.width = this.canvas.width;
     this.paint.height = this.canvas.height;
@@ -37,6 +38,7 @@ export class Pointing {
 
   end(event) {
     const [x, y] = this.place(event);
+    if (!this.isOffered) return;
     if (this.tool === "point") {
       const hit = this.targets.find((target) => inside(target.outline, x, y));
       this.wish(hit ? { kind: "target", number: hit.number } : { kind: "point", x, y });

@@ -1,0 +1,1 @@
+"""A page in a browser as a LeRobot teleoperator of the excavator."""
