@@ -9,6 +9,7 @@ READY := $(VENV)/.ready
 LOWEST := $(VENV)/lowest
 NEWEST := $(VENV)/newest
 DEMO := outputs/demo
+CONSOLE ?= --env.task=Clear-v0 --policy=checkpoints/excavator_mask_act
 JOBS ?= 1
 # The newest Python that pyproject.toml names; pyenv gives a version only when asked for it.
 PYTHON_NEWEST ?= $(shell PYENV_VERSION=3.13 python3.13 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3.13)
@@ -23,7 +24,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate lint type docs wheel clean
+.PHONY: help setup demo console tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -48,6 +49,9 @@ $(READY): pyproject.toml uv.lock
 
 demo: $(READY) ## the trained policy clears a pile where it is pointed at; leaves a video, a map and a table (< 5 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
+
+console: $(READY) ## a page in the browser: point, drive, let the policy dig there; make CONSOLE="--out=outputs/by_hand" console records
+	@PATH="$(CURDIR)/$(RUN):$$PATH" lerobot-excav console $(CONSOLE)
 
 tutorial: $(READY) ## record paired demonstrations, train on them, evaluate: docs/tutorial
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/tutorial.sh outputs/tutorial

@@ -93,5 +93,5 @@ def test_lerobot_finds_the_class_of_the_policy():
 
 def test_the_list_is_complete():
     registered = {config.get_choice_name(config) for config in CONFIGS}
-    excavator = {"excavator", "excavator_sim", "excavator_joystick", "excavator_operator"}
-    assert registered == {*excavator, "fr5_grasp", "fr5_sim", "fr5_operator", "mask_act"}
+    excavator = {"excavator", "excavator_sim", "excavator_joystick", "excavator_operator", "excavator_web"}
+    assert registered == {*excavator, "fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web", "mask_act"}

@@ -168,7 +168,7 @@ class Console:
         self.pilot.rest()
         self.recorder.finish(self.env.task_description, success=self.env.is_success)
         caption = self.env.caption
-        self.say(f"the episode is over: {caption.outcome or 'not decided'}", is_fault=not self.env.is_success)
+        self.say(f"the episode is over: {caption.outcome or 'the task is not done'}", is_fault=not self.env.is_success)
 
     # What is shown.
 

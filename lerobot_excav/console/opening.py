@@ -46,6 +46,7 @@ def open_console(
     speed: float = 1.0,
     policy: Path | None = None,
     out: Path | None = None,
+    say: Callable[[str], None] = lambda words: None,
 ) -> Iterator[OpenConsole]:
     """Serve the page of an environment while the block runs.
 
@@ -56,6 +57,7 @@ def open_console(
         speed: How fast the world is beside real time.
         policy: `pretrained_model` folder of a policy that may work.
         out: Folder of the dataset to record; None records nothing.
+        say: Told what takes long.
 
     Raises:
         ConfigurationError: The task cannot be driven by sticks, or the policy does not fit.
@@ -67,6 +69,8 @@ def open_console(
     recording = None if out is None else Recording(schedule, out)
     env: MaskedTaskEnv[Any, Any] = spec.make_env(**{**schedule.env.as_dict(), "episode_length": ENDLESS_FRAMES})
     seat, feed = DriversSeat(), Feed()
+    if policy is not None:
+        say(f"loading {policy} ...")
     actor, name = (None, None) if policy is None else (_policy(policy), policy.resolve().name)
     pilot = Pilot(env, seat, spec.make_sticks(), policy=actor, policy_name=name)
     first = schedule.pairs()[0] if recording is None or not recording.left else recording.left[0]

@@ -67,7 +67,7 @@ def test_the_page_shows_views_targets_and_the_legend_of_the_sticks(open_page, tm
     with serving() as served:
         page = open_page(served, color_scheme=scheme, viewport={"width": width, "height": 900})
         expect(page.locator("#driver")).to_have_text("you have the controls")
-        expect(page.locator("#scene")).to_contain_text("Scene 0 of train")
+        expect(page.locator("#scene")).to_contain_text("scene 0 of train")
         assert page.url == served.address.partition("?")[0]
         for canvas in ("#view-main", "#view-view_0", "#view-policy", "#view-plan"):
             assert brightness(page, canvas) > 15

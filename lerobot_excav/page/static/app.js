@@ -58,7 +58,8 @@ async function showMoment(moment, pictures) {
 function showHeader() {
   $("task").textContent = state.task;
   const stage = state.scene.stage ? `, ${state.scene.stage} cycles dug` : "";
-  $("scene").textContent = `${state.task_description} Scene ${state.scene.scene_id} of ${state.scene.set}${stage}.`;
+  $("scene").textContent = `scene ${state.scene.scene_id} of ${state.scene.set}${stage}: ${state.task_description}`;
+  showStart();
   const names = { still: "time stands still", drive: state.taken_over ? "you drive, taken over" : "you drive", work: "the policy works" };
   $("mode").textContent = names[state.mode];
   $("mode").dataset.mode = state.mode;
@@ -83,6 +84,16 @@ function showHeader() {
   const axes = isDriver() ? sticks.axes() : AXES.map((axis) => state.axes[axis]);
   hands.forEach((hand) => hand.show(axes, hand.axes.map((i) => words[AXES[i]]), isDriver() && state.ready));
   $("device").textContent = sticks.names?.length ? sticks.names.join(" and ") : "keys and on-screen sticks";
+}
+
+/* The form of the scene shows the present one, until a person changes it. */
+function showStart() {
+  const form = $("start");
+  if (form.dataset.scene === JSON.stringify(state.scene)) return;
+  form.dataset.scene = JSON.stringify(state.scene);
+  form.elements.scene_id.value = state.scene.scene_id;
+  form.elements.stage.value = state.scene.stage;
+  form.elements.stage.max = state.last_stage;
 }
 
 function sendSticks() {

@@ -1,7 +1,7 @@
 /* Two sticks on the screen: they show where the sticks are, what each direction does, and can be dragged. */
 
 const SVG = "http://www.w3.org/2000/svg";
-const REACH = 60; // of the knob, in the drawing's units
+const REACH = 52; // of the knob, in the drawing's units
 const LIT = 0.15; // deflection from which on a word lights up
 const PLACES = [[-1, 0], [1, 0], [0, -1], [0, 1]]; // left, right, up, down
 
@@ -11,7 +11,7 @@ export class Hand {
     this.axes = [first, first + 1];
     this.make("circle", { class: "ring", r: REACH });
     this.knob = this.make("circle", { class: "knob", r: 16 });
-    this.words = PLACES.map(([x, y]) => this.make("text", { x: 88 * x, y: 92 * y + 5 }));
+    this.words = PLACES.map(([x, y]) => this.make("text", { x: 100 * x, y: 92 * y + 5 }));
     const drag = (event) => {
       const box = svg.getBoundingClientRect();
       const scale = 220 / box.width;
