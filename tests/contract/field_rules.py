@@ -265,6 +265,8 @@ JOYSTICK = {
     "next_scene_button": one_of("start", *BUTTONS),
     "device_name": optional(text),
     "device_index": optional(whole(0, 255)),
+    "right_device_name": optional(text).beside(device_index=0),
+    "right_device_index": optional(whole(0, 255)).beside(device_index=0),
     # One without the other says nothing.
     "joystick_axes": numbered(*AXES).beside(joystick_buttons={"back": 6, "start": 7}),
     "joystick_buttons": numbered("back", "start").beside(joystick_axes={axis: n for n, axis in enumerate(AXES)}),

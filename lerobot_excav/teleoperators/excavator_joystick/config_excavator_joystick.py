@@ -56,12 +56,24 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
         high=_LAST_NUMBER,
     )
 
+    right_device_name: str | None = setting(
+        "Two single sticks: name of the one for the right hand, or a part of it; device_name is the left one",
+        default=None,
+    )
+    right_device_index: int | None = setting(
+        "Two single sticks: position of the one for the right hand", default=None, low=0, high=_LAST_NUMBER
+    )
+
     # Numbers differ between devices, so none is assumed.
     joystick_axes: dict[str, int] | None = setting(
         "Number of each axis, for a device that SDL does not know as a gamepad", default=None, low=0, high=_LAST_NUMBER
     )
     joystick_buttons: dict[str, int] | None = setting(
-        "Number of both buttons named above, for such a device", default=None, low=0, high=_LAST_NUMBER
+        "Number of both buttons named above, for such a device; of two single sticks for the left one, which has none "
+        "unless they are numbered",
+        default=None,
+        low=0,
+        high=_LAST_NUMBER,
     )
 
     def __post_init__(self) -> None:
@@ -76,6 +88,21 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
             f"teleop.device_name={self.device_name!r} and teleop.device_index={self.device_index} both choose a "
             "device; give one of them.",
         )
+        require(
+            self.right_device_name is None or self.right_device_index is None,
+            f"teleop.right_device_name={self.right_device_name!r} and teleop.right_device_index="
+            f"{self.right_device_index} both choose the stick for the right hand; give one of them.",
+        )
+        require(
+            not self.has_two_sticks or self.joystick_axes is None,
+            "teleop.joystick_axes numbers the axes of one device; of two single sticks the first two axes are taken. "
+            "Leave it out.",
+        )
+        require(
+            not self.has_two_sticks or self.device_name is not None or self.device_index is not None,
+            "teleop.right_device_name and teleop.right_device_index name the stick for the right hand only; name the "
+            "one for the left hand by teleop.device_name or teleop.device_index, too.",
+        )
         for name, names in (("joystick_axes", AXES), ("joystick_buttons", self.buttons)):
             numbers = getattr(self, name)
             require(
@@ -83,9 +110,14 @@ class ExcavatorJoystickConfig(TeleoperatorConfig):  # type: ignore[misc]  # LeRo
                 f"teleop.{name}={numbers} is not complete; it must number {', '.join(names)}, each otherwise.",
             )
         require(
-            (self.joystick_axes is None) == (self.joystick_buttons is None),
+            self.has_two_sticks or (self.joystick_axes is None) == (self.joystick_buttons is None),
             "teleop.joystick_axes and teleop.joystick_buttons belong together; give both or neither.",
         )
+
+    @property
+    def has_two_sticks(self) -> bool:
+        """Whether each hand has a device of its own."""
+        return self.right_device_name is not None or self.right_device_index is not None
 
     @property
     def buttons(self) -> tuple[str, str]:

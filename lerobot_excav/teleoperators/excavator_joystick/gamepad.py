@@ -77,7 +77,8 @@ class PlainJoystick:
 
     def __init__(self, pygame: Any, joystick: Any, axes: Mapping[str, int], buttons: Mapping[str, int]) -> None:
         self.name = str(joystick.get_name())
-        self._pygame, self._joystick, self._axes, self._buttons = pygame, joystick, axes, buttons
+        self._pygame, self._axes, self._buttons = pygame, axes, buttons
+        self._joystick: Any | None = joystick
         self._instance_id = joystick.get_instance_id()
         for field, numbers, count in (
             ("joystick_axes", axes, joystick.get_numaxes()),
@@ -89,19 +90,23 @@ class PlainJoystick:
 
     def read(self) -> tuple[dict[str, float], dict[str, bool]]:
         """Return axes and buttons; see `Gamepad.read`."""
-        # SDL keeps answering with the last values of a joystick that is gone; only its events say so.
-        for event in self._pygame.event.get():
-            if event.type == self._pygame.JOYDEVICEREMOVED and event.instance_id == self._instance_id:
-                self._joystick = None
-        if self._joystick is None:
+        # SDL keeps answering with the last values of a joystick that is gone, and two devices share the events.
+        self._pygame.event.get()  # updates the device; emptied, or the queue fills up and drops news
+        if self._joystick is None or not self._is_attached():
             raise lost(self.name)
         axes = {axis: float(self._joystick.get_axis(i)) for axis, i in self._axes.items()}
         return axes, {name: bool(self._joystick.get_button(i)) for name, i in self._buttons.items()}
+
+    def _is_attached(self) -> bool:
+        joysticks = self._pygame.joystick
+        present = (joysticks.Joystick(i).get_instance_id() for i in range(joysticks.get_count()))
+        return self._instance_id in present
 
     def close(self) -> None:
         """Close the device."""
         if self._joystick is not None:
             self._joystick.quit()
+            self._joystick = None
 
 
 def open_gamepad(config: ExcavatorJoystickConfig) -> Gamepad:
@@ -111,9 +116,8 @@ def open_gamepad(config: ExcavatorJoystickConfig) -> Gamepad:
         DeviceError: The device is not there, or it is a joystick that SDL does not know and the configuration
             does not number.
     """
-    pygame, sdl_controller = _start_sdl()
-    count = pygame.joystick.get_count()
-    found = [(pygame.joystick.Joystick(i).get_name(), bool(sdl_controller.is_controller(i))) for i in range(count)]
+    pygame, sdl_controller = start_sdl()
+    found = connected_devices()
     axes, buttons = config.joystick_axes, config.joystick_buttons
     is_numbered = axes is not None and buttons is not None
     chosen = choose_device(found, index=config.device_index, name=config.device_name, is_numbered=is_numbered)
@@ -132,8 +136,21 @@ def open_gamepad(config: ExcavatorJoystickConfig) -> Gamepad:
     )
 
 
+def connected_devices() -> list[tuple[str, bool]]:
+    """Return the name of each connected device, and whether SDL knows it as a gamepad."""
+    pygame, sdl_controller = start_sdl()
+    pygame.event.get()  # a device that was just plugged in is an event
+    count = pygame.joystick.get_count()
+    return [(pygame.joystick.Joystick(i).get_name(), bool(sdl_controller.is_controller(i))) for i in range(count)]
+
+
 def choose_device(
-    found: Sequence[tuple[str, bool]], *, index: int | None = None, name: str | None = None, is_numbered: bool = False
+    found: Sequence[tuple[str, bool]],
+    *,
+    index: int | None = None,
+    name: str | None = None,
+    is_numbered: bool = False,
+    prefix: str = "device",
 ) -> int:
     """Return the position of the wanted device.
 
@@ -145,6 +162,7 @@ def choose_device(
         index: Position wanted.
         name: Whole name wanted or, if no device has it, a part of one; any case.
         is_numbered: Whether the user has numbered axes and buttons.
+        prefix: What the settings begin with that choose it, for messages.
 
     Raises:
         DeviceError: No device has this position or name, or several come into question.
@@ -159,11 +177,11 @@ def choose_device(
     if len(candidates) == 1:
         return candidates[0]
     wanted = {"index": index, "name": name}
-    asked = "".join(f"teleop.device_{key}={value!r}" for key, value in wanted.items() if value is not None)
+    asked = "".join(f"teleop.{prefix}_{key}={value!r}" for key, value in wanted.items() if value is not None)
     if candidates:
         raise DeviceError(
             f"{asked or 'the gamepad'} could be any of {len(candidates)} devices; connected: {listed}. Choose one with "
-            f"--teleop.device_index, out of {', '.join(map(str, candidates))}."
+            f"--teleop.{prefix}_index, out of {', '.join(map(str, candidates))}."
         )
     problem = f"{asked} does not match a device" if asked else "there is no gamepad"
     raise DeviceError(
@@ -188,11 +206,11 @@ def _of_kind(found: Sequence[tuple[str, bool]], among: list[int], *, is_numbered
 
 def lost(name: str) -> DeviceError:
     """Return the error for a device that was unplugged or ran out of power."""
-    return DeviceError(f"the gamepad {name!r} is gone; plug it in again and restart the command.")
+    return DeviceError(f"the gamepad {name!r} is gone; plug it in again, and let go of the sticks.")
 
 
-def _start_sdl() -> tuple[Any, Any]:
-    """Start SDL's joystick part without a window."""
+def start_sdl() -> tuple[Any, Any]:
+    """Start SDL's joystick part without a window; return pygame and its module of controllers."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # no window has the focus
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")

@@ -3,6 +3,7 @@
 import pytest
 
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.teleoperators.excavator_joystick import excavator_joystick as module
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_joystick.excavator_joystick import ExcavatorJoystick
 from lerobot_excav.teleoperators.excavator_joystick.gamepad import lost
@@ -80,14 +81,36 @@ def test_a_press_is_told_once_and_a_button_held_from_the_start_is_none(pad, conn
     assert action == STILL | {"next_scene": 1.0}
 
 
-def test_a_lost_device_never_repeats_its_last_command(pad, connect):
+def test_a_lost_device_lets_go_and_drives_again_once_it_is_back_and_centred(pad, connect, caplog, monkeypatch):
+    monkeypatch.setattr(module, "RETRY_S", 0.0)
     pad.axes["left_x"] = 1.0
     teleop = connect()
     assert teleop.get_action()["swing.vel"] == -1.0
     pad.is_lost = True
-    for _ in range(2):
-        with pytest.raises(DeviceError, match="is gone"):
-            teleop.get_action()
+    for _ in range(3):
+        assert teleop.get_action() == STILL
+    assert [record.message for record in caplog.records if "stands still" in record.message]
+    pad.is_lost = False
+    for _ in range(5):  # held over since before
+        assert teleop.get_action() == STILL
+    pad.axes["left_x"] = 0.0
+    for _ in range(module.CENTRED_READS):
+        assert teleop.get_action() == STILL
+    pad.axes["left_x"] = 1.0
+    assert teleop.get_action()["swing.vel"] == -1.0
+    assert "is back" in caplog.text
+
+
+def test_a_device_that_is_gone_is_looked_for_now_and_then_only(pad, connect, monkeypatch):
+    teleop = connect()
+    pad.is_lost = True
+    tries = []
+    monkeypatch.setattr(teleop, "_open_device", lambda config: tries.append(config) or pad.open(config))
+    for _ in range(20):
+        assert teleop.get_action() == STILL
+    assert tries == []  # not before a second is over
+    teleop.disconnect()
+    assert not teleop.is_connected
 
 
 def test_use_out_of_turn_is_refused(pad, connect):
