@@ -8,6 +8,7 @@
 | robot | `excavator_sim` | `ExcavatorSimConfig` |
 | robot | `fr5_sim` | `FR5SimConfig` |
 | teleoperator | `excavator_joystick` | `ExcavatorJoystickConfig` |
+| teleoperator | `excavator_keyboard` | `ExcavatorKeyboardConfig` |
 | teleoperator | `excavator_operator` | `ExcavatorOperatorConfig` |
 | teleoperator | `excavator_web` | `ExcavatorWebConfig` |
 | teleoperator | `fr5_operator` | `FR5OperatorConfig` |
@@ -24,6 +25,7 @@ from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
+from lerobot_excav.teleoperators.excavator_keyboard.config_excavator_keyboard import ExcavatorKeyboardConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
 from lerobot_excav.teleoperators.excavator_web.config_excavator_web import ExcavatorWebConfig
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
@@ -32,6 +34,7 @@ from lerobot_excav.teleoperators.fr5_web.config_fr5_web import FR5WebConfig
 __all__ = [
     "ExcavatorEnvConfig",
     "ExcavatorJoystickConfig",
+    "ExcavatorKeyboardConfig",
     "ExcavatorOperatorConfig",
     "ExcavatorSimConfig",
     "ExcavatorWebConfig",

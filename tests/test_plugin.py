@@ -93,5 +93,12 @@ def test_lerobot_finds_the_class_of_the_policy():
 
 def test_the_list_is_complete():
     registered = {config.get_choice_name(config) for config in CONFIGS}
-    excavator = {"excavator", "excavator_sim", "excavator_joystick", "excavator_operator", "excavator_web"}
+    excavator = {
+        "excavator",
+        "excavator_sim",
+        "excavator_joystick",
+        "excavator_operator",
+        "excavator_web",
+        "excavator_keyboard",
+    }
     assert registered == {*excavator, "fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web", "mask_act"}

@@ -26,6 +26,7 @@ from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSim
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.scripts.main import COMMANDS
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
+from lerobot_excav.teleoperators.excavator_keyboard.config_excavator_keyboard import ExcavatorKeyboardConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
 from lerobot_excav.teleoperators.excavator_web.config_excavator_web import ExcavatorWebConfig
 from lerobot_excav.teleoperators.fr5_operator.config_fr5_operator import FR5OperatorConfig
@@ -377,6 +378,11 @@ CONFIGURATIONS = {
     "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS)), "stage": whole(0, 0)}, {}),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),
     "excavator_operator": (ExcavatorOperatorConfig, {"seed": whole(0)}, {}),
+    "excavator_keyboard": (
+        ExcavatorKeyboardConfig,
+        {"pattern": one_of("iso", "sae"), "speed": number(high=1, above=0)},
+        {},
+    ),
     "excavator_web": (ExcavatorWebConfig, PAGE, {}),
     "fr5_web": (FR5WebConfig, PAGE, {}),
     "fr5_operator": (FR5OperatorConfig, {"seed": whole(0)}, {}),

@@ -1,0 +1,1 @@
+"""The keyboard as a LeRobot teleoperator of the excavator."""
