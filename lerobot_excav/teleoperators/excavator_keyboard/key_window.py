@@ -48,7 +48,8 @@ class KeyWindow:
         screen.fill(_PAPER_RGB)
         font = pygame.font.Font(None, _LINE_PX)
         for number, line in enumerate(lines):
-            screen.blit(font.render(line, antialias=True, color=_INK_RGB), (16, 14 + number * _LINE_PX))
+            text = font.render(line, True, _INK_RGB)  # noqa: FBT003 - it takes no names
+            screen.blit(text, (16, 14 + number * _LINE_PX))
         pygame.display.flip()
 
     def read(self) -> tuple[set[str], set[str]]:
