@@ -1,7 +1,9 @@
 """The loop behind the page: time passes in it, wishes are granted, and every moment is shown."""
 
+import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,14 @@ from lerobot_excav.page.scene_state import scene_state
 from lerobot_excav.page.target_marks import target_marks
 from lerobot_excav.page.wishes import Wish
 
+logger = logging.getLogger(__name__)
+
 IDLE_FPS = 5
 """Moments a second while time stands still (kind: guess)."""
+
+LONGEST_EPISODE_S = 600.0
+"""Simulated time after which a recorded episode is finished [s]: somebody has left; its frames fill the memory (kind:
+guess)."""
 
 SHOWN_FPS = 10
 """Pictures a second at most; drawing them takes 35 ms on a machine without a graphics card (kind: measured)."""
@@ -63,7 +71,8 @@ class Console:
         self._pictures: dict[str, bytes] = {}
         self._marks: list[dict[str, Any]] = []
         self._is_new = True  # whether the scene looks otherwise than shown
-        self._shown_frame = 0
+        self._shown_frame, self._sticks_number = 0, -1
+        self._generation = seat.generation
         self._share = 1.0  # of the speed that is asked for, as far as this machine reaches it
         self._acted: NDArray[np.float32] | None = None
 
@@ -104,7 +113,8 @@ class Console:
         due_s = time.monotonic()
         while not is_over():
             has_passed = self.tick()
-            period_s = 1.0 / (self._speed_asked * self.env.fps if has_passed else IDLE_FPS)
+            is_awake = has_passed or self.pilot.mode != STILL  # the first motion of the sticks is noticed at once
+            period_s = 1.0 / (self._speed_asked * self.env.fps if is_awake else IDLE_FPS)
             due_s, now_s = due_s + period_s, time.monotonic()
             if has_passed:
                 late_s = max(0.0, now_s - due_s)
@@ -129,43 +139,84 @@ class Console:
             time.sleep(min(left_s, 0.02))
 
     def _grant_wishes(self) -> None:
-        for wish in self.seat.wishes():
+        wishes = self.seat.wishes()
+        for wish in wishes:
             self.say("")
-            try:
+            with self._faults_told():
                 self._grant(self, wish)
-            except ExcavError as error:
-                self.say(str(error), is_fault=True)
-        if self.seat.driver is None and self.pilot.mode != STILL:
+        if wishes:
+            self.seat.wishes()  # what was asked for while the page could not see that it was heard
+        if self.seat.generation != self._generation:
+            self._generation = self.seat.generation
+            self._stop("stopped: the controls were given up, or taken by another page")
+        elif self.pilot.mode == WORK and not self.seat.is_heard():
+            self._stop("stopped: the page that has the controls is not heard any more")
+
+    @contextmanager
+    def _faults_told(self) -> Iterator[None]:
+        """Let nothing end the console: what goes wrong is told."""
+        try:
+            yield
+        except (ExcavError, OSError) as error:
+            self.say(str(error), is_fault=True)
+        except Exception as error:
+            logger.exception("the console goes on after a fault")
+            self.say(f"a fault of the program, told in its window: {error!r}", is_fault=True)
+
+    def _stop(self, words: str) -> None:
+        if self.pilot.mode != STILL:
             self.pilot.rest()
-            self.say("stopped: no page has the controls", is_fault=True)
+            self.say(words, is_fault=True)
 
     def _pass_frame(self) -> bool:
         """Let a frame pass if somebody acts; tell whether it did."""
         if self.env.is_over or self.recorder.is_waiting_for_a_verdict:
             self.pilot.rest()
         mode = self.pilot.mode
-        action = self.pilot.act(self.observation)
-        if action is None:
-            return False
-        if self.pilot.mode != mode:
-            self.say("you have taken over; hand back, or drive on")
-        self.recorder.add(self.observation, self.info, action, by_policy=self.pilot.mode == WORK)
+        with self._faults_told():
+            action = self.pilot.act(self.observation)
+            if action is None:
+                return False
+            if self.pilot.mode != mode:
+                self.say("you have taken over; hand back, or drive on")
+            self._carry_out(action)
+            return True
+        self.pilot.rest()  # after a fault
+        return False
+
+    def _carry_out(self, action: NDArray[np.float32]) -> None:
         command_frame = self.info["command_frame"]
+        self.recorder.add(self.observation, self.info, action, by_policy=self.pilot.mode == WORK)
         self.observation, _, terminated, truncated, self.info = self.env.step(action)
         self._acted, self._is_new = action, True
         self.recorder.note(self.info)
         if terminated or truncated:
             self.finish_episode()
         elif self.info["command_frame"] != command_frame:
-            self.look()
-            if self.pilot.works_once:
-                self.pilot.rest()
-                self.say("the cycle is over; point where to dig next, or let the planner's choice stand")
-        return True
+            self._note_command()
+        elif self.recorder.length >= round(LONGEST_EPISODE_S * self.env.fps):
+            self.finish_episode()
+            self.say(f"finished: an episode is recorded for {LONGEST_EPISODE_S:.0f} s at most", is_fault=True)
+
+    def _note_command(self) -> None:
+        """Show the command that the task has just given."""
+        self.look()
+        if self.pilot.works_once:
+            self.pilot.rest()
+            self.say("the cycle is over; point where to dig next, or let the planner's choice stand")
+        else:
+            self.say("the cycle is over; the planner commands the next region")
 
     def finish_episode(self) -> None:
         """End the episode in hand, as its outcome is now."""
+        by_policy = self.pilot.mode == WORK
         self.pilot.rest()
+        if self.recorder.is_running and not self.env.is_over and self.info["command_frame"] == self.env.frame > 0:
+            # A replay gives no command after the last frame, so one more passes under it, or its task state differs.
+            hold = np.asarray(self.env.holding_action(), np.float32)
+            self.recorder.add(self.observation, self.info, hold, by_policy=by_policy)
+            self.observation, *_, self.info = self.env.step(hold)
+            self.recorder.note(self.info)
         self.recorder.finish(self.env.task_description, success=self.env.is_success)
         caption = self.env.caption
         self.say(f"the episode is over: {caption.outcome or 'the task is not done'}", is_fault=not self.env.is_success)
@@ -178,11 +229,20 @@ class Console:
         self._shown_frame += 1
         if self._is_new and (self.pilot.mode == STILL or self._shown_frame % every == 0 or not self._pictures):
             self._pictures, self._is_new = self._views.pictures(self.observation), False
+            self._sticks_number = self.pilot.sticks_number
         self.feed.publish(self._state(), self._pictures)
 
     def _state(self) -> dict[str, Any]:
-        scene = scene_state(self.env, self.seat, legend=self.pilot.legend, marks=self._marks, acted=self._acted)
+        scene = scene_state(
+            self.env,
+            self.seat,
+            legend=self.pilot.legend,
+            marks=self._marks,
+            sticks_number=self._sticks_number,
+            acted=self._acted,
+        )
         return scene | {
+            "views": list(self._pictures),
             "mode": self.pilot.mode,
             "policy": self.pilot.policy_name,
             "taken_over": self.pilot.has_taken_over,

@@ -12,12 +12,14 @@ from lerobot_excav.console.console import Console
 from lerobot_excav.console.pilot import Pilot
 from lerobot_excav.console.recorder import Recorder
 from lerobot_excav.console.recording import Recording
-from lerobot_excav.console.wishes import grant
+from lerobot_excav.console.wishes import grant, show_next
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
-from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES
+from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES, TaskSettings
 from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.evaluation.audit.actor import Actor
 from lerobot_excav.page.access import Access
 from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed
@@ -65,19 +67,23 @@ def open_console(
         DeviceError: The address is taken.
     """
     spec = task_of_settings(schedule.env)
+    require(
+        schedule.env.episode_length is None,
+        f"--env.episode_length={schedule.env.episode_length} has no effect: a person ends an episode; leave it out",
+    )
     require(spec.sticks_entry is not None, f"{spec.id} does not say what sticks do to its machine")
     recording = None if out is None else Recording(schedule, out)
     env: MaskedTaskEnv[Any, Any] = spec.make_env(**{**schedule.env.as_dict(), "episode_length": ENDLESS_FRAMES})
     seat, feed = DriversSeat(), Feed()
     if policy is not None:
         say(f"loading {policy} ...")
-    actor, name = (None, None) if policy is None else (_policy(policy), policy.resolve().name)
+    actor, name = (None, None) if policy is None else (_policy(policy, schedule.env), policy.resolve().name)
     pilot = Pilot(env, seat, spec.make_sticks(), policy=actor, policy_name=name)
-    first = schedule.pairs()[0] if recording is None or not recording.left else recording.left[0]
     console = Console(env, seat, feed, pilot=pilot, recorder=Recorder(recording), grant=grant, size=size, speed=speed)
     try:
         with PageServer(access, feed, seat).running():
-            console.start(**first.reset_options)
+            if recording is None or show_next(console, recording) is None:
+                console.start(**schedule.pairs()[0].reset_options)
             console.show()
             yield OpenConsole(console=console, address=access.address)
     finally:
@@ -85,10 +91,23 @@ def open_console(
         env.close()
 
 
-def _policy(checkpoint: Path) -> Any:
-    """Load a policy; LeRobot is imported here alone, since that takes seconds."""
-    from lerobot_excav.evaluation.audit.actor import PolicyActor
+def _policy(checkpoint: Path, settings: TaskSettings) -> Actor:
+    """Load a policy, and check that it is one for this machine; LeRobot is imported here alone: it takes seconds."""
+    from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config
 
+    config = policy_config(checkpoint)
+    spec, (height, width) = task_of_settings(settings), settings.observation_size
+    sizes: dict[str, tuple[int, ...]] = {
+        schema.STATE_KEY: (len(spec.state_names),),
+        schema.ACTION_KEY: (len(spec.action_names),),
+    }
+    sizes |= {schema.camera_key(camera): (3, height, width) for camera in spec.cameras}
+    for key, feature in {**config.input_features, **config.output_features}.items():
+        require(
+            tuple(feature.shape) == sizes.get(key),
+            f"--policy={checkpoint} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} has "
+            f"{sizes.get(key, 'none')}; give a policy of this machine, or its --env.observation_height and _width",
+        )
     try:
         return PolicyActor(checkpoint)
     except OSError as error:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.sticks import Legend, StickControl
-from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.errors import ConfigurationError, ExcavError, require
 from lerobot_excav.evaluation.audit.actor import Actor
 from lerobot_excav.page.drivers_seat import DriversSeat
 
@@ -31,6 +31,7 @@ class Pilot:
         mode: `still`, `drive` or `work`.
         has_taken_over: Whether a person has taken the controls from the policy, and has them.
         works_once: Whether the policy is to stop where its command changes.
+        sticks_number: Number of the message of the sticks that has acted last.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class Pilot:
         self._env, self._seat, self._sticks, self._policy = env, seat, sticks, policy
         self.policy_name = policy_name
         self.mode, self.has_taken_over, self.works_once = STILL, False, False
-        self._waits = False
+        self._waits, self.sticks_number = False, -1
 
     @property
     def legend(self) -> Legend:
@@ -65,7 +66,9 @@ class Pilot:
         self._require_running()
         self._sticks.reset(self._env)
         self.has_taken_over = self.mode == WORK or self.has_taken_over
-        self.mode, self._waits = DRIVE, self.mode == STILL
+        self.works_once = False
+        self._waits = self.mode == STILL or (self.mode == DRIVE and self._waits)
+        self.mode = DRIVE
 
     def work(self, *, once: bool = False) -> None:
         """Let the policy work from here on, without a memory of what was before; `once`: until the command changes.
@@ -80,20 +83,33 @@ class Pilot:
         self.mode, self.has_taken_over, self.works_once = WORK, False, once
 
     def act(self, observation: dict[str, Any]) -> Action | None:
-        """Return the action of the next frame; None while time stands still."""
-        axes, _ = self._seat.axes()
+        """Return the action of the next frame; None while time stands still.
+
+        Raises:
+            ExcavError: The policy has failed.
+        """
+        axes, number = self._seat.axes()
         if self.mode == WORK and self._seat.wants_controls():
             self.drive()
         if self.mode == WORK:
-            assert self._policy is not None  # or `work` had refused
-            return self._policy.act(self._env, observation)
+            return self._act_of_policy(observation)
         if self.mode == STILL or not self._seat.sticks.is_ready:
             return None
         response = self._seat.response
         if self._waits and not any(response.of(axes, axis) for axis in axes):
             return None
-        self._waits = False
+        self._waits, self.sticks_number = False, number
         return self._sticks.action(axes, response)
+
+    def _act_of_policy(self, observation: dict[str, Any]) -> Action:
+        assert self._policy is not None  # or `work` had refused
+        try:
+            action = self._policy.act(self._env, observation)
+        except Exception as error:  # it is someone else's
+            raise ExcavError(f"the policy {self.policy_name} has failed: {' '.join(str(error).split())}") from error
+        if not np.isfinite(action).all():
+            raise ExcavError(f"the policy {self.policy_name} has failed: its action is not finite")
+        return action
 
     def _require_running(self) -> None:
         require(not self._env.is_over, "the episode is over; start the scene again, or take another one")

@@ -27,7 +27,7 @@ class Recorder:
         self.recording = recording
         self.pair: Pair | None = None
         self.episode: Episode | None = None
-        self._tape, self._policy_acted = EpisodeTape(), False
+        self._tape, self._by_policy = EpisodeTape(), list[bool]()
 
     @property
     def is_waiting_for_a_verdict(self) -> bool:
@@ -38,6 +38,16 @@ class Recorder:
     def is_running(self) -> bool:
         """Whether an episode is taken down."""
         return self.pair is not None and self.episode is None
+
+    @property
+    def has_frames(self) -> bool:
+        """Whether an episode is in hand, running or finished, that would be lost."""
+        return self.pair is not None and self._tape.length > 0
+
+    @property
+    def length(self) -> int:
+        """Frames of the running episode."""
+        return self._tape.length if self.is_running else 0
 
     def require_recording(self) -> Recording:
         """Return where episodes go.
@@ -55,14 +65,13 @@ class Recorder:
     def begin(self, pair: Pair) -> None:
         """Begin to take an episode down; the environment was just reset to its start."""
         self.pair, self.episode = pair, None
-        self._tape, self._policy_acted = EpisodeTape(), False
+        self._tape, self._by_policy = EpisodeTape(), list[bool]()
 
     def add(self, observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any], *, by_policy: bool) -> None:
-        """Take a frame down, before it passes: what a person does after a policy has begun is an intervention."""
+        """Take a frame down, before it passes, and whether a policy acts in it."""
         if self.is_running:
-            self._policy_acted = self._policy_acted or by_policy
-            took_over = self._policy_acted and not by_policy
-            self._tape.add(observation, info, np.asarray(action, np.float32), intervention=took_over)
+            self._tape.add(observation, info, np.asarray(action, np.float32))
+            self._by_policy.append(by_policy)
 
     def note(self, info: dict[str, Any]) -> None:
         """Take down what the frame led to."""
@@ -76,8 +85,11 @@ class Recorder:
         if self._tape.length == 0:
             self.forget()
             return
-        operator = "policy" if self._policy_acted else "person"
-        self.episode = replace(self._tape.episode(self.pair, task, operator=operator), success=success)
+        episode = self._tape.episode(self.pair, task, operator="person")
+        if any(self._by_policy):  # then all that a person did is marked, before it and after it
+            by_person = ~np.array(self._by_policy)
+            episode = replace(episode, operator="policy", intervention=by_person)
+        self.episode = replace(episode, success=success)
 
     def keep(self) -> None:
         """Put the finished episode on the disk.
@@ -108,7 +120,7 @@ class Recorder:
             "kept": self.recording.kept,
             "next": None if not left else left[0]._asdict(),
             "running": self.is_running,
-            "frames": self._tape.length if self.is_running else 0,
+            "frames": self.length,
             "verdict": None if episode is None else {"success": episode.success, "frames": episode.length},
             "complete": self.recording.is_complete,
         }

@@ -96,7 +96,8 @@ class Recording:
             raise DatasetError("no episode is kept yet, so there is nothing to write; record one first")
         if self._partial.dataset.exists():  # of a try that failed
             shutil.rmtree(self._partial.dataset)
-        dataset = create_dataset(self._partial.dataset, self.settings)
+        longest = max(outcome["frames"] for outcome in self._outcomes.values() if outcome is not None)
+        dataset = create_dataset(self._partial.dataset, self.settings, longest=longest)
         for number, pair in enumerate(kept, start=1):
             append_episode(dataset, self._store.read(pair), self.settings)
             progress(number, len(kept))

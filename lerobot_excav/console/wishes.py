@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lerobot_excav.console.console import Console
+from lerobot_excav.console.recording import Recording
+from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.envs.tasks.selection import TargetAbsentError
-from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.page.wishes import Wish
 
 LARGEST_PICTURE_PX = 4_000_000
@@ -51,21 +53,26 @@ def _target(console: Console, wish: Wish) -> None:
     require(wish.number is not None, "a target needs its number")
     assert wish.number is not None
     console.look(console.env.recommand(wish.number))
-    console.say(f"target {wish.number} is commanded")
+    console.say(f"target {wish.number + 1} is commanded")
 
 
 def _start(console: Console, wish: Wish) -> None:
     _require_free(console)
+    for name in wish.values:
+        require_choice("start", name, ("scene_id", "stage", "target_id"))
+    prepare(console, wish.values.get("stage", 0))
     console.start(**wish.values)
     console.say(f"scene {console.env.scene_id}")
 
 
 def _drive(console: Console, wish: Wish) -> None:
+    _require_decided(console)
     console.pilot.drive()
     console.say("you drive: move a stick")
 
 
 def _work(console: Console, wish: Wish) -> None:
+    _require_decided(console)
     once = bool(wish.values.get("once", 0))
     console.pilot.work(once=once)
     until = "this cycle is over" if once else "the task is over"
@@ -80,24 +87,22 @@ def _stop(console: Console, wish: Wish) -> None:
 def _record(console: Console, wish: Wish) -> None:
     """Begin the next start of the schedule that offers its target."""
     recorder = console.recorder
-    require(not recorder.is_waiting_for_a_verdict, "decide on the last episode first: keep it, or record it again")
+    _require_decided(console)
     recording = recorder.require_recording()
-    recorder.forget()
-    while left := recording.left:
-        try:
-            console.start(**left[0].reset_options)
-        except TargetAbsentError:  # a late stage may have fewer regions
-            recording.leave_out(left[0])
-            continue
-        recorder.begin(left[0])
-        console.pilot.drive()
-        console.say("recording begins with your first motion")
-        return
-    raise ConfigurationError("every start is recorded; write the dataset")
+    require(not recorder.is_running, "an episode is being recorded; finish it first")
+    if recording.left:
+        prepare(console, recording.left[0].stage)
+    pair = show_next(console, recording)
+    if pair is None:
+        raise ConfigurationError("every start is recorded; write the dataset")
+    recorder.begin(pair)
+    console.pilot.drive()
+    console.say("recording begins with your first motion")
 
 
 def _finish(console: Console, wish: Wish) -> None:
     require(console.recorder.is_running, "nothing is recorded now")
+    require(console.recorder.has_frames, "there is nothing to finish yet: recording begins with your first motion")
     console.finish_episode()
 
 
@@ -115,6 +120,7 @@ def _again(console: Console, wish: Wish) -> None:
 def _skip(console: Console, wish: Wish) -> None:
     recorder = console.recorder
     recording = recorder.require_recording()
+    require(not recorder.has_frames, "an episode is in hand; finish it, and keep it or record it again")
     pair = recorder.pair or next(iter(recording.left), None)
     recorder.forget()
     console.pilot.rest()
@@ -136,6 +142,25 @@ def _complete(console: Console, wish: Wish) -> None:
     console.show()
     out = recording.complete(progress)
     console.say(f"written: {out}; check it with lerobot-excav qc {out}")
+
+
+def show_next(console: Console, recording: Recording) -> Pair | None:
+    """Show the next start that offers its target, and return it; None if nothing is left."""
+    while left := recording.left:
+        try:
+            console.start(**left[0].reset_options)
+        except TargetAbsentError:  # a late stage may have fewer regions
+            recording.leave_out(left[0])
+            continue
+        return left[0]
+    return None
+
+
+def prepare(console: Console, stage: int) -> None:
+    """Tell the page that a start takes long to reach, before it does."""
+    if stage:
+        console.say(f"a seeded operator digs {stage} cycles first; that takes some seconds each, the first time")
+        console.show()
 
 
 _GRANTS: dict[str, Callable[[Console, Wish], None]] = {
@@ -163,6 +188,12 @@ def _require_free(console: Console) -> None:
     )
 
 
+def _require_decided(console: Console) -> None:
+    require(
+        not console.recorder.is_waiting_for_a_verdict, "decide on the last episode first: keep it, or record it again"
+    )
+
+
 def painted_pixels(picture: str, size: tuple[int, int]) -> NDArray[np.bool_]:
     """Return which of a policy's pixels (H, W) a painted mask covers, a picture in base64 of any size.
 
@@ -170,10 +201,10 @@ def painted_pixels(picture: str, size: tuple[int, int]) -> NDArray[np.bool_]:
         ConfigurationError: It is no picture.
     """
     try:
-        image = Image.open(io.BytesIO(base64.b64decode(picture, validate=True)))
+        image = Image.open(io.BytesIO(base64.b64decode(picture, validate=True)), formats=("PNG",))
         require(image.width * image.height <= LARGEST_PICTURE_PX, "the painted mask is too large")
         grey = image.convert("L")
-    except (ValueError, OSError, Image.DecompressionBombError) as error:
+    except (ValueError, OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise ConfigurationError("the painted mask is no picture; reload the page") from error
     height, width = size
     # Of every pixel, the part that is painted: black stays black, whatever the brush's colour.

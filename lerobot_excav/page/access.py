@@ -10,9 +10,6 @@ from urllib.parse import urlsplit
 
 from lerobot_excav.errors import DeviceError
 
-COOKIE = "excav_token"
-"""Holds the token once the page was opened with it, so that it leaves the address bar."""
-
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -31,6 +28,11 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
 
     @property
+    def cookie(self) -> str:
+        """Name of the cookie that holds the token once the page was opened with it; browsers share cookies of ports."""
+        return f"excav_token_{self.port}"
+
+    @property
     def address(self) -> str:
         """Address of the page, with the token."""
         host = "127.0.0.1" if self.host in ("0.0.0.0", "::") else self.host
@@ -38,7 +40,7 @@ class Access:
 
     def knows_token(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
         """Tell whether a request knows the token, from the address or from an earlier visit."""
-        given = query.get("token") or cookies.get(COOKIE, "")
+        given = query.get("token") or cookies.get(self.cookie, "")
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     def is_for_us(self, headers: Mapping[str, str]) -> bool:
@@ -54,7 +56,9 @@ class Access:
         return origin is None or urlsplit(origin).netloc == host
 
     def _is_our_name(self, host: str) -> bool:
-        name, _, port = host.rpartition(":")
+        name, colon, port = host.rpartition(":")
+        if not colon or "]" in port:  # browsers leave the port of HTTP out
+            name, port = host, "80"
         if port != str(self.port):
             return False
         if name in LOOPBACK or name.strip("[]") == self.host:
@@ -82,7 +86,8 @@ def free_port(host: str) -> int:
         DeviceError: The address is not of this machine.
     """
     try:
-        with socket.create_server((host, 0)) as server:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        with socket.create_server((host, 0), family=family) as server:
             return int(server.getsockname()[1])
     except OSError as error:
         raise DeviceError(f"--host={host} is no address of this machine; give another one, or leave it out") from error

@@ -3,10 +3,11 @@
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from lerobot_excav.envs.tasks.sticks import StickResponse
-from lerobot_excav.page.sticks import Sticks
+from lerobot_excav.page.sticks import CENTRED, Sticks
 from lerobot_excav.page.wishes import ResponseMessage, Wish
 
 MOST_WISHES = 100
@@ -20,15 +21,28 @@ class DriversSeat:
     Attributes:
         sticks: Sticks of the page that drives.
         response: How they answer.
+        clock: Tells the time [s].
         delay_ms: From stick to picture, as that page measured it last [ms]; None before.
     """
 
     sticks: Sticks = field(default_factory=Sticks)
     response: StickResponse = field(default_factory=StickResponse)
     delay_ms: float | None = None
+    clock: Callable[[], float] = time.monotonic
     _driver: int | None = None
+    _generation: int = 0
     _wishes: deque[Wish] = field(default_factory=lambda: deque(maxlen=MOST_WISHES))
     _lock: threading.RLock = field(default_factory=threading.RLock)
+
+    @property
+    def generation(self) -> int:
+        """Changes whenever the controls are taken or given up."""
+        return self._generation
+
+    def is_heard(self) -> bool:
+        """Tell whether the page that drives has said lately where its sticks are."""
+        with self._lock:
+            return self._driver is not None and self.sticks.is_heard(self.clock())
 
     @property
     def driver(self) -> int | None:
@@ -54,7 +68,7 @@ class DriversSeat:
         """Take in where the sticks of a page are."""
         with self._lock:
             if self._driver == page:
-                self.sticks.report(axes, number, time.monotonic())
+                self.sticks.report(axes, number, self.clock(), centred=max(CENTRED, self.response.dead_zone))
                 if lost:
                     self.sticks.let_go()
 
@@ -81,12 +95,12 @@ class DriversSeat:
     def axes(self) -> tuple[dict[str, float], int]:
         """Return where the sticks are, as far as it counts, and the number of the message that said so."""
         with self._lock:
-            return self.sticks.axes(time.monotonic()), self.sticks.number
+            return self.sticks.axes(self.clock()), self.sticks.number
 
     def wants_controls(self) -> bool:
         """Tell whether the person at the sticks wants to take over."""
         with self._lock:
-            return self.sticks.take_over(time.monotonic())
+            return self.sticks.take_over(self.clock())
 
     def let_go(self) -> None:
         """Forget where the sticks are, until they were centred again."""
@@ -94,5 +108,6 @@ class DriversSeat:
             self.sticks.let_go()
 
     def _reset(self) -> None:
-        self.sticks, self.delay_ms = Sticks(), None
+        self.sticks, self.delay_ms = Sticks(heard_since_s=self.clock()), None
+        self._generation += 1
         self._wishes.clear()

@@ -22,14 +22,15 @@ class Moment:
     state: Mapping[str, Any]
     pictures: Mapping[str, bytes]
 
-    def message(self, **own: Any) -> bytes:
+    def message(self, *, with_pictures: bool = True, **own: Any) -> bytes:
         """Return the moment as one message: the length of the header (4 bytes, little-endian), header, pictures.
 
-        `own` is what is told to one page alone.
+        `own` is what is told to one page alone; a page that has the pictures already does without them.
         """
-        parts = [[name, len(data)] for name, data in self.pictures.items()]
+        pictures = self.pictures if with_pictures else {}
+        parts = [[name, len(data)] for name, data in pictures.items()]
         header = json.dumps({"number": self.number, "pictures": parts, **self.state, **own}).encode()
-        return b"".join([len(header).to_bytes(4, "little"), header, *self.pictures.values()])
+        return b"".join([len(header).to_bytes(4, "little"), header, *pictures.values()])
 
 
 class Feed:

@@ -18,7 +18,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.page.access import COOKIE, Access
+from lerobot_excav.page.access import Access
 from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed
 from lerobot_excav.page.wishes import (
@@ -89,7 +89,7 @@ class PageServer:
             return refusal
         if "token" in request.query_params:  # keep it out of the history and of what others see on the screen
             response: Response = RedirectResponse("/", headers=_HEADERS)
-            response.set_cookie(COOKIE, self.access.token, httponly=True, samesite="strict")
+            response.set_cookie(self.access.cookie, self.access.token, httponly=True, samesite="lax")
             return response
         return FileResponse(STATIC / "index.html", headers=_HEADERS)
 
@@ -132,11 +132,13 @@ class PageServer:
 
     async def _send(self, socket: WebSocket, page: int, drawn: "_Drawn") -> None:
         """Send the newest moment as soon as the page has drawn the one before the last."""
-        number = 0
+        number, pictures = 0, None
         while True:
             moment = await self._feed.newer_than(number)
             number = moment.number
-            await socket.send_bytes(moment.message(**self._own(page)))
+            message = moment.message(with_pictures=moment.pictures is not pictures, **self._own(page))
+            pictures = moment.pictures
+            await socket.send_bytes(message)
             await drawn.wait(number - 1)
 
     def _own(self, page: int) -> dict[str, Any]:

@@ -34,21 +34,23 @@ class Sticks:
     Attributes:
         number: Number of the last message, by the page's own count.
         is_ready: Whether the sticks were seen centred since they were last lost.
+        heard_since_s: When the controls were taken, which counts as being heard [s].
     """
 
     number: int = -1
     is_ready: bool = False
     _axes: Mapping[str, float] | None = None
+    heard_since_s: float = -1e9
     _at_s: float = -1e9
     _centred: int = 0
 
-    def report(self, axes: Sequence[float], number: int, at_s: float) -> None:
-        """Take in a message: the four axes in [-1, 1], its number, and when it came [s]."""
+    def report(self, axes: Sequence[float], number: int, at_s: float, *, centred: float = CENTRED) -> None:
+        """Take in a message: the four axes in [-1, 1], its number, when it came [s]; `centred` counts as none."""
         if at_s - self._at_s > LOST_S:
             self.let_go()
         self._axes = dict(zip(AXES, axes, strict=True))
         self.number, self._at_s = number, at_s
-        self._centred = self._centred + 1 if max(map(abs, axes)) <= CENTRED else 0
+        self._centred = self._centred + 1 if max(map(abs, axes)) <= centred else 0
         self.is_ready = self.is_ready or self._centred >= CENTRED_MESSAGES
 
     def let_go(self) -> None:
@@ -68,6 +70,6 @@ class Sticks:
         """Tell whether a person wants the controls: a stick is held well out of its centre."""
         return max(map(abs, self.axes(now_s).values())) >= TAKEOVER
 
-    def is_fresh(self, now_s: float) -> bool:
-        """Tell whether the last message is young enough to count."""
-        return self._axes is not None and now_s - self._at_s <= STALE_S
+    def is_heard(self, now_s: float) -> bool:
+        """Tell whether a message came lately, or the controls have just been taken."""
+        return now_s - max(self._at_s, self.heard_since_s) <= LOST_S

@@ -14,9 +14,11 @@ Mark = dict[str, Any]
 def target_marks(env: MaskedTaskEnv[Any, Any]) -> list[Mark]:
     """Return the targets of the scene: `number`, middle `x`, `y` and `outline` [[x, y], ...], each from 0 to 1.
 
-    Those out of sight are left out.
+    Those out of sight are left out, and places that were pointed at before, but for the one that is commanded.
     """
-    commands = sorted([env.command, *env.other_commands()], key=lambda command: command.target_id)
+    count = env.task_spec.target_count
+    others = [command for command in env.other_commands() if command.target_id < count]
+    commands = sorted([env.command, *others], key=lambda command: command.target_id)
     marks = []
     for command in commands:
         pixels = env.true_mask(command)

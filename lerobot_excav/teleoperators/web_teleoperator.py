@@ -8,6 +8,7 @@ import logging
 from contextlib import ExitStack
 from typing import Any, ClassVar, override
 
+from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.page.access import Access, free_port
@@ -52,7 +53,8 @@ class WebTeleoperator(SimulationTeleoperator):
         self._sticks = task_of_robot(self.robot_type).make_sticks()
         self._shown: tuple[SimulatedRobot, LiveViews] | None = None
         self._episode, self._marks = -1, list[Mark]()
-        self._frames = 0
+        self._command: Command | None = None
+        self._frames, self._sticks_number = 0, -1  # the robot acts after the picture, so it is the message before
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -89,16 +91,19 @@ class WebTeleoperator(SimulationTeleoperator):
             raise DeviceError("the page is not served; call connect() first.")
         robot = live.connected_robot(self.robot_type)
         if robot.episode_count != self._episode:
-            self._episode = robot.episode_count
+            self._episode, self._command = robot.episode_count, None
             self._sticks.reset(robot.env)
+        if robot.env.command is not self._command:
+            self._command = robot.env.command
             self._marks = target_marks(robot.env)
         robot.note_operator("person")
         wishes = {wish.kind for wish in self._seat.wishes()}
         if "stop" in wishes:
             self._seat.let_go()
-        axes, _ = self._seat.axes()
+        axes, number = self._seat.axes()
         command = self._sticks.action(axes, self._seat.response)
         self._show(robot, command)
+        self._sticks_number = number
         action = dict(zip(robot.task_spec.action_names, command.tolist(), strict=True))
         return action | {key: 1.0 for wish, key in _KEYS.items() if wish in wishes}
 
@@ -109,10 +114,18 @@ class WebTeleoperator(SimulationTeleoperator):
         if self._shown is None or self._shown[0] is not robot:
             self._close_views()
             self._shown = robot, LiveViews(robot.env, height=self.config.height, width=self.config.width)
-        scene = scene_state(robot.env, self._seat, legend=self._sticks.legend, marks=self._marks, acted=command)
+        scene = scene_state(
+            robot.env,
+            self._seat,
+            legend=self._sticks.legend,
+            marks=self._marks,
+            sticks_number=self._sticks_number,
+            acted=command,
+        )
         told = {"policy": None, "taken_over": False, "recording": None, "words": "", "fault": False, "speed": 1.0}
         pictures = self._shown[1].pictures(robot.env.observe())
-        self._feed.publish(scene | told | {"mode": "drive", "offers": list(OFFERS)}, pictures)
+        own = {"mode": "drive", "offers": list(OFFERS), "views": list(pictures)}
+        self._feed.publish(scene | told | own, pictures)
 
     def _close_views(self) -> None:
         if self._shown is not None:

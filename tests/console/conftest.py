@@ -28,8 +28,10 @@ class Driver:
 
     def __init__(self, console):
         self.console, self.seat = console, console.seat
-        self._numbers = itertools.count()
+        self._numbers, self.now_s = itertools.count(), 0.0
+        self.seat.clock = lambda: self.now_s  # however slow the machine is that tests
         self.seat.take(PAGE)
+        console.tick()  # takes note of who drives
         self.seat.response = StickResponse(dead_zone=0.0)
         self.centre()
         console.tick()
@@ -39,9 +41,11 @@ class Driver:
             self.hold(CENTRE)
 
     def hold(self, axes):
+        self.now_s += 0.02
         self.seat.report(PAGE, list(axes), next(self._numbers), lost=False)
 
     def wish(self, kind, **values):
+        self.hold(CENTRE)
         self.seat.wish(PAGE, Wish(kind=kind, **values))
         self.tick()
 

@@ -9,6 +9,8 @@ from PIL import Image
 
 from lerobot_excav.console.wishes import painted_pixels
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.page.sticks import LOST_S
+from lerobot_excav.page.wishes import Wish
 
 from .conftest import CENTRE, PAGE, Planted
 
@@ -39,7 +41,8 @@ def test_sticks_that_were_not_centred_drive_nothing(open_driver):
     driver = open_driver()
     driver.seat.leave(PAGE)
     driver.seat.take(PAGE)
-    driver.wish("drive")
+    driver.console.tick()
+    driver.seat.wish(PAGE, Wish(kind="drive"))
     assert driver.tick(SWING_LEFT, times=5) == 0
     driver.centre()
     assert driver.tick(SWING_LEFT, times=5) == 5
@@ -52,7 +55,55 @@ def test_time_stands_still_when_the_page_that_drives_is_gone_and_the_page_says_w
     driver.seat.leave(PAGE)
     assert not driver.console.tick()
     assert driver.state["mode"] == "still"
-    assert "no page has the controls" in driver.state["words"]
+    assert "the controls were given up" in driver.state["words"]
+
+
+def test_a_policy_stops_when_the_page_is_not_heard_any_more_or_another_page_has_taken_the_controls(open_driver):
+    driver = open_driver(policy=Planted())
+    driver.wish("work")
+    assert driver.tick(times=3) == 3
+    driver.seat.sticks._at_s -= 2.0 * LOST_S  # a connection that is half open, a page that is hidden
+    driver.console.tick()
+    assert "not heard any more" in driver.state["words"]
+    assert driver.state["mode"] == "still"
+    driver.centre()
+    driver.wish("work")
+    driver.seat.take(PAGE + 1, force=True)
+    driver.console.tick()
+    assert driver.state["mode"] == "still"
+    assert "another page" in driver.state["words"]
+
+
+class Broken(Planted):
+    """A policy that fails, or asks for something that is no number."""
+
+    def __init__(self, action=None):
+        super().__init__()
+        self._action = action
+
+    def act(self, env, observation):
+        return self._action if self._action is not None else {}["no such weight"]
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"), [(Broken(), "no such weight"), (Broken(np.full(4, np.nan, np.float32)), "not finite")]
+)
+def test_a_policy_that_fails_stops_and_the_console_goes_on(open_driver, policy, words):
+    driver = open_driver(policy=policy)
+    driver.wish("work")
+    assert driver.state["mode"] == "still"
+    assert words in driver.state["words"]
+    driver.wish("drive")
+    assert driver.tick(SWING_LEFT, times=3) == 3
+
+
+def test_a_fault_of_the_program_itself_is_told_and_the_console_goes_on(open_driver, monkeypatch):
+    driver = open_driver()
+    monkeypatch.setattr(driver.console.env, "recommand", lambda target_id: {}[target_id])
+    driver.wish("target", number=1)
+    assert "a fault of the program" in driver.state["words"]
+    driver.wish("start", values={"scene_id": 1})
+    assert driver.state["scene"]["scene_id"] == 1
 
 
 def test_a_policy_works_a_stick_takes_over_and_it_is_handed_back(open_driver):
@@ -84,6 +135,7 @@ def test_what_is_not_possible_is_refused_with_words_and_nothing_changes(open_dri
         ("paint", {"picture": "nonsense"}, "no picture"),
         ("start", {"values": {"scene_id": 0, "stage": 99}}, "stage"),
         ("start", {"values": {"colour": 3}}, "colour"),
+        ("start", {"values": {"self": 3}}, "self"),
     ):
         driver.wish(kind, **values)
         assert words in driver.state["words"], kind
@@ -117,8 +169,13 @@ def test_painted_masks_of_any_size_become_the_policys_pixels_and_thin_lines_do_n
     line = np.zeros((480, 640), dtype=bool)
     line[:, 100] = True
     assert not painted_pixels(png_of(line), (96, 128)).any()
-    with pytest.raises(ConfigurationError, match="no picture"):
-        painted_pixels(base64.b64encode(b"PNG").decode(), (96, 128))
+    data = base64.b64decode(png_of(pixels))
+    jpeg = io.BytesIO()
+    Image.fromarray(pixels).convert("L").save(jpeg, format="jpeg")
+    broken = data.replace(b"IDAT", b"IDAX")
+    for wrong in (b"PNG", data[:40], broken, jpeg.getvalue()):
+        with pytest.raises(ConfigurationError, match="no picture"):
+            painted_pixels(base64.b64encode(wrong).decode(), (96, 128))
 
 
 def test_another_scene_is_shown_at_its_stage(open_driver):
@@ -139,8 +196,29 @@ def test_one_cycle_of_clearing_ends_where_the_planner_commands_the_next(open_dri
     assert driver.tick(times=30) < 15
     assert driver.state["mode"] == "still"
     assert "the cycle is over" in driver.state["words"]
+    # At the standstill the planner's choice is of this very frame, and so is what a person points at, twice.
+    driver.wish("point", x=0.6, y=0.55)
+    driver.wish("point", x=0.55, y=0.6)
+    assert "commanded" in driver.state["words"]
+    assert driver.console.env.commands[-1].since_frame == driver.console.env.frame
     driver.wish("work")
     assert driver.tick(times=30) == 30
+    assert "the planner commands the next region" in driver.state["words"]
+
+
+def test_pointing_gives_a_cycle_its_whole_time_and_driving_is_not_stopped_at_its_end(open_driver, monkeypatch):
+    from lerobot_excav.envs.tasks.clear import clearing
+
+    monkeypatch.setattr(clearing, "CYCLE_LIMIT_S", 1.0)
+    driver = open_driver(env={"task": "Clear-v0"}, policy=Planted())
+    driver.wish("work", values={"once": 1})  # a frame passes in which it is granted
+    driver.tick(times=7)
+    driver.wish("point", x=0.6, y=0.55)
+    assert driver.tick(times=8) == 8
+    assert driver.state["mode"] == "work"
+    driver.tick(SWING_LEFT)
+    assert driver.tick(SWING_LEFT, times=15) == 15
+    assert driver.state["mode"] == "drive"
 
 
 def test_the_pictures_are_those_of_the_cameras_and_a_map_and_the_mask_is_tinted_into_main(open_driver):

@@ -1,6 +1,7 @@
 """Demonstrations recorded at the console: the schedule, the verdict, the dataset."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSe
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
-from .conftest import Planted, axes_of
+from .conftest import CENTRE, Planted, axes_of
 
+ROOT = Path(__file__).parents[2]
 CURL = [0.0, 0.0, -0.5, 0.0]
 SHORT = 6
 
@@ -32,6 +34,7 @@ def recorded(open_driver, tmp_path):
         driver.wish("finish")
         driver.wish("keep")
     driver.wish("record")
+    driver.tick(CURL, times=2)
     driver.wish("work")
     driver.tick(times=SHORT)  # the policy acts in the frame of the wish too
     driver.tick(axes_of([0.5, 0.0, 0.0, 0.0]), times=3)
@@ -60,7 +63,8 @@ def test_a_recorded_dataset_is_complete_passes_qc_and_says_who_commanded(recorde
     assert operators == {0: {"person"}, 1: {"person"}, 2: {"person"}, 3: {"policy"}}
     took_over = np.array(rows["excav.intervention"]).ravel()
     assert not took_over[episode < 3].any()
-    assert took_over[episode == 3].tolist() == [False] * (SHORT + 1) + [True] * 5
+    # What a person did before the policy has begun is marked, too: it is not the policy's.
+    assert took_over[episode == 3].tolist() == [True] * 2 + [False] * (SHORT + 1) + [True] * 5
     success = np.array(rows["excav.success"]).ravel()
     assert [bool(success[episode == i][0]) for i in range(4)] == [True, False, False, False]
     report = check_dataset(out, replays=4, show_progress=False)
@@ -83,8 +87,9 @@ def test_again_throws_the_episode_away_and_shows_the_same_start_and_put_off_come
     driver.tick(CURL, times=SHORT)
     driver.wish("finish")
     assert driver.state["recording"]["verdict"] == {"success": False, "frames": SHORT}
-    driver.wish("record")
-    assert "decide on the last episode first" in driver.state["words"]
+    for kind in ("record", "drive", "work"):
+        driver.wish(kind)
+        assert "decide on the last episode first" in driver.state["words"]
     driver.wish("again")
     assert (driver.state["frame"], driver.state["target"], driver.state["recording"]["kept"]) == (0, 0, 0)
     driver.wish("skip")
@@ -93,6 +98,13 @@ def test_again_throws_the_episode_away_and_shows_the_same_start_and_put_off_come
     assert driver.state["target"] == 1
     driver.wish("point", x=0.6, y=0.55)
     assert "an episode is being recorded" in driver.state["words"]
+    driver.tick(CURL)
+    for kind, words in (("record", "finish it first"), ("skip", "an episode is in hand")):
+        driver.wish(kind)  # such as by a button of the pad
+        assert words in driver.state["words"]
+    assert driver.state["recording"]["frames"] == 1
+    driver.wish("finish")
+    driver.wish("again")
     driver.wish("skip")
     for target in (2, 3, 0, 1):
         driver.wish("record")
@@ -106,6 +118,7 @@ def test_an_episode_without_a_frame_is_no_episode(open_driver, tmp_path):
     driver = open_driver(out=tmp_path / "by_hand")
     driver.wish("record")
     driver.wish("finish")
+    assert "nothing to finish yet" in driver.state["words"]
     assert driver.state["recording"]["verdict"] is None
     assert driver.state["recording"]["left"] == 4
 
@@ -114,6 +127,8 @@ def test_frames_before_the_first_motion_are_not_recorded_and_a_pause_leaves_none
     driver = open_driver(out=tmp_path / "by_hand")
     driver.wish("record")
     driver.tick(times=20)
+    driver.wish("drive")  # as a person may press, who does not know that it is on
+    driver.tick(times=5)
     assert driver.state["recording"]["frames"] == 0
     driver.tick(CURL, times=3)
     driver.wish("stop")
@@ -173,3 +188,52 @@ def test_demonstrations_by_hand_and_by_script_merge(recorded, tmp_path):
     assert set(operators) == {"person", "policy", "scripted"}
     info = json.loads((tmp_path / "merged" / "meta" / "info.json").read_text())
     assert info["total_episodes"] == 5
+
+
+@pytest.mark.parametrize("env_type", ["excavator", "fr5_grasp"])
+def test_recordings_of_tasks_that_are_judged_at_the_end_pass_qc(open_driver, tmp_path, monkeypatch, env_type):
+    from lerobot_excav.envs.tasks.clear import clearing
+
+    env = {"task": "Clear-v0"} if env_type == "excavator" else {}
+    driver = open_driver(env_type, env=env, out=tmp_path / "by_hand", targets=1, scenes=2)
+    for frames in (12, 10):
+        driver.wish("record")
+        driver.tick([-0.5, 0.0, 0.0, 0.5], times=frames)
+        if env:  # the cycle is given up in the last frame, and another region commanded
+            monkeypatch.setattr(clearing, "CYCLE_LIMIT_S", 1.3)
+            driver.tick(CENTRE)
+            monkeypatch.setattr(clearing, "CYCLE_LIMIT_S", 25.0)
+        driver.wish("finish")
+        driver.wish("keep")
+    driver.wish("complete")
+    assert driver.state["recording"]["complete"], driver.state["words"]
+    if env:
+        monkeypatch.setattr(clearing, "CYCLE_LIMIT_S", 1.3)
+    report = check_dataset(tmp_path / "by_hand", replays=2)
+    assert report.has_passed, report.episodes["qc_problem"].tolist()
+
+
+def test_an_episode_that_nobody_ends_is_finished_and_an_episode_length_is_refused(open_driver, tmp_path, monkeypatch):
+    from lerobot_excav.console import console, opening
+    from lerobot_excav.page.access import Access
+
+    monkeypatch.setattr(console, "LONGEST_EPISODE_S", 0.5)
+    driver = open_driver(out=tmp_path / "by_hand")
+    driver.wish("record")
+    driver.tick(CURL, times=8)
+    assert driver.state["recording"]["verdict"]["frames"] == 5
+    settings = DemonstrationSettings.of("excavator", {"episode_length": 50}, scenes=1)
+    access = Access(host="127.0.0.1", port=1)
+    with pytest.raises(ConfigurationError, match="episode_length=50 has no effect"):
+        opening.open_console(settings, access=access, size=(96, 128)).__enter__()
+
+
+def test_a_policy_of_another_machine_is_refused_at_the_start():
+    from lerobot_excav.console import opening
+
+    settings = DemonstrationSettings.of("excavator", scenes=1).env
+    with pytest.raises(ConfigurationError, match="was trained with observation"):
+        opening._policy(ROOT / "checkpoints" / "fr5_grasp_mask_act", settings)
+    other = DemonstrationSettings.of("excavator", {"observation_width": 64}, scenes=1).env
+    with pytest.raises(ConfigurationError, match="observation_height and _width"):
+        opening._policy(ROOT / "checkpoints" / "excavator_mask_act", other)

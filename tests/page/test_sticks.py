@@ -50,7 +50,6 @@ def test_a_stale_message_is_rest_and_never_the_last_command_again(axes, age_s):
     sticks, now_s = centred()
     sticks.report(axes, 50, now_s)
     assert sticks.axes(now_s + age_s) == REST
-    assert not sticks.is_fresh(now_s + age_s)
 
 
 def test_after_a_short_gap_the_sticks_count_again_and_after_a_long_one_they_are_centred_first():
@@ -76,3 +75,22 @@ def test_a_person_takes_over_with_a_stick_well_out_of_its_centre_and_not_by_rest
         sticks.report([0.0, 0.0, value, 0.0], 50, now_s)
         assert sticks.take_over(now_s) == takes
     assert not sticks.take_over(now_s + 10.0)
+
+
+def test_a_wider_dead_zone_lets_a_pad_drift_further():
+    sticks = Sticks()
+    for number in range(20):
+        sticks.report([0.12, 0.0, 0.0, 0.0], number, number * STEP_S)
+    assert not sticks.is_ready
+    for number in range(20):
+        sticks.report([0.12, 0.0, 0.0, 0.0], number, number * STEP_S, centred=0.15)
+    assert sticks.is_ready
+
+
+def test_a_page_is_heard_from_taking_the_controls_on_as_long_as_it_sends():
+    sticks = Sticks(heard_since_s=1.0)
+    assert sticks.is_heard(1.0 + 0.9 * LOST_S)
+    assert not sticks.is_heard(1.0 + 1.1 * LOST_S)
+    sticks.report(OVER, 1, 3.0)
+    assert sticks.is_heard(3.0 + 0.9 * LOST_S)
+    assert not sticks.is_heard(3.0 + 1.1 * LOST_S)

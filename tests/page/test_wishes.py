@@ -60,10 +60,12 @@ def test_one_page_drives_and_what_others_send_is_left_out():
     seat.wish(2, Wish(kind="stop"))
     assert [wish.kind for wish in seat.wishes()] == ["stop"]
     assert seat.wishes() == []
+    generation = seat.generation
     seat.leave(1)
-    assert seat.driver == 2
+    assert (seat.driver, seat.generation) == (2, generation)
     seat.leave(2)
     assert seat.driver is None
+    assert seat.generation > generation
 
 
 def test_whoever_takes_or_leaves_the_controls_starts_from_centred_sticks():

@@ -28,8 +28,14 @@ VIDEO_ENCODER = {"vcodec": "h264", "pix_fmt": "yuv444p", "crf": 0, "g": 2, "pres
 VIDEO_FILE_SIZE_MB = 0.001
 
 
-def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDataset:
-    """Create an empty dataset in a folder that does not exist yet."""
+def create_dataset(root: Path, settings: DemonstrationSettings, *, longest: int | None = None) -> LeRobotDataset:
+    """Create an empty dataset in a folder that does not exist yet.
+
+    Args:
+        root: The folder.
+        settings: What is recorded.
+        longest: Frames of the longest episode; that of the settings by default.
+    """
     features = schema.dataset_features(
         settings.task_spec,
         height=settings.env.observation_height,
@@ -43,12 +49,12 @@ def create_dataset(root: Path, settings: DemonstrationSettings) -> LeRobotDatase
         features=features,
         robot_type=settings.task_spec.robot_type,
         video_backend="pyav",  # never used; looking for a better one prints a page where none is installed
-        **_writer(settings),
+        **_writer(settings, longest or settings.episode_length),
     )
 
 
-def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
-    """Return how LeRobot is to write the pictures."""
+def _writer(settings: DemonstrationSettings, longest: int) -> dict[str, Any]:
+    """Return how LeRobot is to write the pictures of episodes with so many frames at most."""
     if settings.storage == "image":
         return {"use_videos": False, "image_writer_threads": IMAGE_THREADS}
     # LeRobot's encoders give libav's messages back to the terminal while others are at work.
@@ -59,7 +65,7 @@ def _writer(settings: DemonstrationSettings) -> dict[str, Any]:
         "video_files_size_in_mb": VIDEO_FILE_SIZE_MB,
         "streaming_encoding": True,
         # A full queue would drop pictures, so it holds a whole episode.
-        "encoder_queue_maxsize": settings.episode_length + 1,
+        "encoder_queue_maxsize": longest + 1,
         "encoder_threads": 1,
     }
 

@@ -76,10 +76,8 @@ class EpisodeTape:
         """Number of frames so far."""
         return len(self._frames)
 
-    def add(
-        self, observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any], *, intervention: bool = False
-    ) -> None:
-        """Take down what is seen and told before an action, and the action; whether a person took over for it."""
+    def add(self, observation: dict[str, Any], info: dict[str, Any], action: NDArray[Any]) -> None:
+        """Take down what is seen and told before an action, and the action."""
         pixels = observation.get("pixels", {})
         self._cameras = tuple(pixels)
         self._frames.append(
@@ -90,7 +88,6 @@ class EpisodeTape:
                 "target_id": np.int64(info["target_id"]),
                 "command_frame": np.int64(info["command_frame"]),
                 "task_state": np.asarray(info["task_state"], dtype=np.float32),
-                "intervention": np.bool_(intervention),
             }
         )
 
@@ -113,6 +110,7 @@ class EpisodeTape:
             mask_missing_frames=self._info["mask_missing_frames"],
             metrics=dict(self._metrics),
             operator=operator,
+            intervention=np.zeros(self.length, dtype=np.bool_),
             **columns,
         )
 

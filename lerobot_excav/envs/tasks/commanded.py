@@ -265,15 +265,20 @@ class CommandedEnv(WatchedEnv):
         return self._point(self._target_at(covered_w.mean(axis=0)), self._corrupted(PointedSource(pixels)))
 
     def _point(self, target_id: int, source: MaskSource) -> Seen:
-        last, source_before = self._commands[-1], self._source
+        """Command a target by a source's mask; without one, everything stays as it was."""
+        commands, mask = list(self._commands), None
+        self._commands.append(Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame))
+        try:
+            mask = source.mask(self, self.command) if self._shows_pixels else None
+            if self._shows_pixels and mask is None:
+                raise MaskMissingError(f"mask_source={self.settings.mask_source!r} does not find target {target_id}")
+        except BaseException:
+            self._commands = commands
+            raise
+        if commands[-1].since_frame == self._frame:  # nothing was done under the command before
+            del self._commands[-2]
         self._begin_command(target_id)
-        self._give_command(target_id, source)
-        if self.mask_missing:
-            self._begin_command(last.target_id)
-            self._give_command(last.target_id, source_before)
-            raise MaskMissingError(f"mask_source={self.settings.mask_source!r} does not find target {target_id}")
-        if last.since_frame == self._frame:  # nothing was done under the command before
-            self._commands.remove(last)
+        self._source, self._mask = source, mask
         return self._observe(), self._info(is_over=False)
 
     def _corrupted(self, source: MaskSource) -> MaskSource:

@@ -38,6 +38,7 @@ async function drawPicture(name, blob) {
 /* Draw a moment; return the time from stick to picture [ms], or null if the sticks were not part of it. */
 async function showMoment(moment, pictures) {
   state = moment;
+  const { sticks_number: acted, mode } = moment; // another moment may come while this one is drawn
   document.body.dataset.frame = state.frame;
   await Promise.all(Object.entries(pictures).map(([name, blob]) => drawPicture(name, blob)));
   await new Promise((resolve) => (document.hidden ? resolve() : requestAnimationFrame(resolve)));
@@ -47,8 +48,9 @@ async function showMoment(moment, pictures) {
   showHeader();
   showGauges(state);
   showRecording(state, isDriver());
-  const sentAt = sent.get(state.sticks_number);
-  const delay = isDriver() && state.mode === "drive" && sentAt !== undefined ? performance.now() - sentAt : null;
+  const sentAt = sent.get(acted);
+  const isNew = Object.keys(pictures).length > 0;
+  const delay = isNew && isDriver() && mode === "drive" && sentAt !== undefined ? performance.now() - sentAt : null;
   const speed = state.speed < 0.95 ? `, ${Math.round(100 * state.speed)} % of real time` : "";
   if (delay !== null) $("delay").textContent = `stick to picture ${Math.round(delay)} ms${speed}`;
   else if (state.mode === "still") $("delay").textContent = "";
@@ -78,11 +80,14 @@ function showHeader() {
   if (!state.task.startsWith("Clear")) $("once").hidden = true;
   if (state.recording) $("restart").hidden = true; // the recording has a button of its own
   $("drive").disabled = !isDriver() || state.over;
-  $("plan").hidden = !state.pictures.some(([name]) => name === "plan");
+  $("plan").hidden = !state.views.includes("plan");
   $("stage-field").hidden = !state.last_stage;
   const words = state.legend[$("pattern").value];
   const axes = isDriver() ? sticks.axes() : AXES.map((axis) => state.axes[axis]);
-  hands.forEach((hand) => hand.show(axes, hand.axes.map((i) => words[AXES[i]]), isDriver() && state.ready));
+  const turned = [...document.querySelectorAll("input[name=invert]:checked")].map((input) => input.value);
+  const said = (axis) => (turned.includes(axis) ? [...words[axis]].reverse() : words[axis]);
+  hands.forEach((hand) => hand.show(axes, hand.axes.map((i) => said(AXES[i])), isDriver() && state.ready));
+  for (const part of document.querySelectorAll("#start input, #start button")) part.disabled = !isDriver();
   $("device").textContent = sticks.names?.length ? sticks.names.join(" and ") : "keys and on-screen sticks";
 }
 
@@ -104,7 +109,8 @@ function sendSticks() {
   sent.delete(number - KEPT_MOMENTS);
   link.send({ kind: "sticks", axes, number, lost: sticks.takeLost() });
   for (const button of sticks.takePressed()) {
-    if (state.offers.includes(PAD_WISHES[button])) wish({ kind: PAD_WISHES[button] });
+    const control = $(PAD_WISHES[button]);
+    if (control && !control.disabled && control.offsetParent) wish({ kind: control.dataset.wish });
   }
 }
 
@@ -123,9 +129,12 @@ function recallResponse() {
 }
 
 function onKey(event, isDown) {
-  if (event.target.matches("input[type=number], select") || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (sticks.key(event.code, isDown)) event.preventDefault();
+  const isTyping = event.target.matches("input[type=number], select");
+  if (!isDown) sticks.key(event.code, false); // whatever else is pressed, or a key would stick
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (isDown && !isTyping && sticks.key(event.code, true)) event.preventDefault();
   if (!isDown || event.repeat || !isDriver()) return;
+  if (isTyping && !STOP_KEYS.includes(event.code)) return;
   if (STOP_KEYS.includes(event.code)) {
     event.preventDefault();
     wish({ kind: "stop" });
@@ -135,8 +144,11 @@ function onKey(event, isDown) {
   }
 }
 
+let refusals = 0; // in a row
 const link = new Link(showMoment, (isOpen) => {
-  $("link").textContent = isOpen ? "connected" : "not connected";
+  refusals = isOpen ? 0 : refusals + 1;
+  const lost = refusals > 3 ? "not connected: open the address that the command printed" : "not connected";
+  $("link").textContent = isOpen ? "connected" : lost;
   $("link").dataset.link = isOpen ? "open" : "lost";
   if (isOpen) link.send({ kind: "take", force: false });
   if (isOpen) sendResponse();
@@ -158,8 +170,12 @@ $("start").addEventListener("submit", (event) => {
   const values = { scene_id: Number(form.get("scene_id")) };
   if (state.last_stage) values.stage = Number(form.get("stage"));
   wish({ kind: "start", values });
+  document.activeElement.blur();
 });
-for (const id of ["pattern", "dead_zone", "expo"]) $(id).addEventListener("change", sendResponse);
+for (const id of ["pattern", "dead_zone", "expo"]) {
+  $(id).addEventListener("change", (event) => { sendResponse(); event.target.blur(); }); // or arrows would change it
+}
+$("pads").addEventListener("change", (event) => { sticks.usesPads = event.target.checked; event.target.blur(); });
 for (const input of document.querySelectorAll("input[name=invert]")) input.addEventListener("change", sendResponse);
 addEventListener("keydown", (event) => onKey(event, true));
 addEventListener("keyup", (event) => onKey(event, false));

@@ -16,7 +16,8 @@ export class Link {
     const socket = new WebSocket(`${scheme}://${location.host}/live`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => this.onOpen(true);
-    socket.onmessage = (event) => this.receive(event.data);
+    let last = Promise.resolve(); // one moment after the other, or an older one may be drawn over a newer one
+    socket.onmessage = (event) => { last = last.then(() => this.receive(event.data)); };
     socket.onclose = () => {
       this.onOpen(false);
       setTimeout(() => this.open(), AGAIN_MS);

@@ -29,8 +29,9 @@ export function showRecording(state, isDriver) {
     : recording.running ? `recording, ${recording.frames} frames` : `${where}; ${recording.left} of ${recording.count} left, ${recording.kept} kept`;
   $("progress").value = recording.count ? 1 - recording.left / recording.count : 1;
   $("record").disabled = !isDriver || recording.running || Boolean(verdict) || !next || recording.complete;
-  $("finish").disabled = !isDriver || !recording.running;
-  $("skip").disabled = !isDriver || Boolean(verdict) || !next || recording.complete;
+  $("finish").disabled = !isDriver || !recording.frames;
+  $("skip").disabled = !isDriver || Boolean(verdict) || recording.frames > 0 || !next || recording.complete;
+  for (const id of ["drive", "work", "once"]) if (verdict) $(id).disabled = true;
   $("complete").disabled = !isDriver || recording.running || Boolean(verdict) || !recording.kept || recording.complete;
   $("complete").classList.toggle("wanted", !recording.left && !recording.complete && !verdict);
   $("verdict").hidden = !verdict;

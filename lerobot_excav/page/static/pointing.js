@@ -12,6 +12,7 @@ export class Pointing {
     canvas.addEventListener("pointerdown", (event) => this.begin(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.end(event));
+    canvas.addEventListener("pointercancel", () => this.forget());
   }
 
   get tool() { return document.querySelector("input[name=tool]:checked").value; }
@@ -23,7 +24,8 @@ export class Pointing {
   }
 
   begin(event) {
-    if (this.tool !== "paint" || !this.isOffered) return;
+    this.isPressed = event.button === 0 && this.isOffered;
+    if (this.tool !== "paint" || !this.isPressed) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.paint.width = this.canvas.width;
     this.paint.height = this.canvas.height;
@@ -36,9 +38,15 @@ export class Pointing {
     if (this.hasPaint && this.canvas.hasPointerCapture(event.pointerId)) this.stroke(this.place(event));
   }
 
+  forget() {
+    this.isPressed = this.hasPaint = false;
+    this.draw();
+  }
+
   end(event) {
     const [x, y] = this.place(event);
-    if (!this.isOffered) return;
+    if (!this.isPressed) return; // the press began elsewhere, or with another button
+    this.isPressed = false;
     if (this.tool === "point") {
       const hit = this.targets.find((target) => inside(target.outline, x, y));
       this.wish(hit ? { kind: "target", number: hit.number } : { kind: "point", x, y });

@@ -13,7 +13,7 @@ export class Sticks {
     this.screen = [0, 0, 0, 0];
     this.pads = [];        // ids of the pads in use
     this.isLost = false;   // whether one of them is gone
-    this.buttons = {};
+    this.usesPads = true;
     addEventListener("blur", () => this.release());
     document.addEventListener("visibilitychange", () => document.hidden && this.release());
   }
@@ -42,16 +42,17 @@ export class Sticks {
     return axes;
   }
 
-  /* One pad with two sticks, or the first two devices with one stick each, the left hand's first. */
+  /* One gamepad that the browser knows, or the first two sticks of other devices, the left hand's first. */
   padAxes() {
-    const pads = [...navigator.getGamepads()].filter((pad) => pad && pad.connected && pad.axes.length >= 2);
-    const whole = pads.find((pad) => pad.axes.length >= 4);
+    const pads = this.usesPads ? [...navigator.getGamepads()].filter((pad) => pad?.connected && pad.axes.length >= 2) : [];
+    const whole = pads.find((pad) => pad.mapping === "standard" && pad.axes.length >= 4);
     const used = whole ? [whole] : pads.slice(0, 2);
     const ids = used.map((pad) => `${pad.index}:${pad.id}`);
-    if (this.pads.some((id) => !ids.includes(id))) this.isLost = true;
+    if (this.usesPads && this.pads.some((id) => !ids.includes(id))) this.isLost = true;
     this.pads = ids;
     this.names = used.map((pad) => pad.id.split("(")[0].trim());
-    this.pressed = used.flatMap((pad) => pad.buttons.map((button, i) => (button.pressed ? i : -1))).filter((i) => i >= 0);
+    // Buttons of other devices have no names: a trigger is no wish.
+    this.pressed = whole ? whole.buttons.map((button, i) => (button.pressed ? i : -1)).filter((i) => i >= 0) : [];
     const values = whole ? whole.axes.slice(0, 4) : used.flatMap((pad) => pad.axes.slice(0, 2));
     return AXES.map((_, i) => Math.max(-1, Math.min(1, values[i] ?? 0)));
   }

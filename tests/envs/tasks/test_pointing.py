@@ -127,6 +127,34 @@ def test_a_keep_out_zone_bars_pointing_too():
     row, column = np.argwhere(inside)[0]
     with pytest.raises(ConfigurationError, match="bars this place"):
         env.point_at((column + 0.5) / 128, (row + 0.5) / 96)
+    assert len(env.scene.targets) == len(env.plan.proposals)
+    row, column = np.argwhere((place_w[..., 1] > 0.8) & (np.abs(place_w[..., 0]) < 0.5))[0]
+    env.point_at((column + 0.5) / 128, (row + 0.5) / 96)
+    assert env.target.center_w[1] > 0.8
+    env.close()
+
+
+def test_places_may_be_pointed_at_again_and_again_in_one_frame(env):
+    env.reset(options={"scene_id": 2, "target_id": 0})
+    env.step(STILL)
+    for x in (0.45, 0.5, 0.55):
+        env.point_at(x, 0.6)
+    assert [command.since_frame for command in env.commands] == [0, 1]
+    assert env.command.region is env.target
+
+
+def test_a_load_that_was_dug_before_pointing_is_not_dug_at_the_new_place():
+    env = ExcavatorEnv(fidelity="fast", obs_type="agent_pos", render_mode=None)
+    env.reset(options={"scene_id": 2, "target_id": 0})
+    operator = env.task_spec.make_operator(np.random.default_rng(0))
+    operator.reset(env)
+    while env.cycle.state.bucket_mass_kg < 200.0:
+        env.step(operator.act(env))
+    assert env.cycle.target_hit
+    env.recommand(1)
+    for _ in range(5):
+        env.step(STILL)
+    assert env.cycle.target_hit is None
     env.close()
 
 
@@ -150,9 +178,11 @@ def test_a_task_without_places_says_so_and_a_source_that_finds_nothing_leaves_th
     with pytest.raises(ConfigurationError, match="cannot be pointed at a place"):
         toy.point_at(0.5, 0.5)
     monkeypatch.setattr(toy._named_source, "mask", lambda view, command: None)
+    commands, mask = toy.commands, toy.mask
     with pytest.raises(MaskMissingError, match="does not find target 2"):
         toy.recommand(2)
-    assert toy.target_id == 1
+    assert toy.commands == commands
+    assert toy.mask is mask is not None
     toy.close()
 
 

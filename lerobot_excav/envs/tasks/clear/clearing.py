@@ -55,8 +55,10 @@ class Clearing:
         self._events.begin_cycle()
 
     def recommand(self, target_id: int, proposal: Proposal) -> None:
-        """Command another of the proposed regions within the cycle."""
+        """Command another of the proposed regions within the cycle; if nothing is loaded yet, its time begins again."""
         self._proposal = proposal
+        if self.cycle.onset_time_s is None:
+            self._began_s = self._events.time_s
         self.cycle.retarget(target_id)
 
     def update(self) -> None:

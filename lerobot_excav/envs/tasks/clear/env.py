@@ -147,9 +147,9 @@ class ClearEnv(ExcavatorEnv):
     @override
     def _target_at(self, place_w: NDArray[np.float64]) -> int:
         """Let the planner rate a place that somebody else proposes, beside its own proposals."""
-        target_id = super()._target_at(place_w)
         rated = rate(place_w[None], self.surface, self._excavator_settings.zones, self._clearing.vain_w)
         require(not rated.is_barred[0], f"keep_out={self._excavator_settings.keep_out!r} bars this place")
+        target_id = super()._target_at(place_w)
         self.plan = replace(self.plan, proposals=(*self.plan.proposals, proposal_of(rated, 0)))
         return target_id
 

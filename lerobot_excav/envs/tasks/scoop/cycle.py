@@ -61,6 +61,7 @@ class DigCycle:
         """Command another dig region from now on; a region that was hit before counts no more."""
         self.target_id = target_id
         self.target_hit = self.onset_time_s = self.onset_w = None
+        self._was_empty = self._worksite.soil.payload_mass_kg <= LOADING_ONSET_KG  # what is carried is not loaded there
         self._meter.retarget(self.target)
 
     @property

@@ -166,7 +166,8 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     @override
     def plan_view(self) -> NDArray[np.uint8]:
         """Return the dig area from above, the machine below it; see `plan_view.draw_plan`."""
-        return draw_plan(self.worksite, self.scene.targets, self.target_id)
+        shown = dict(enumerate(self.scene.targets[: self.task_spec.target_count])) | {self.target_id: self.target}
+        return draw_plan(self.worksite, shown, self.target_id)
 
     @override
     def places_w(self) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """The worksite from above: heights as colours, the regions, the bucket."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +22,14 @@ _REGION_RGB, _BUCKET_RGB, _REACH_RGB = (235, 235, 235), (255, 190, 40), (90, 96,
 _BUCKET_PX = 4
 
 
-def draw_plan(worksite: Worksite, targets: Sequence[Target], commanded: int) -> NDArray[np.uint8]:
+def draw_plan(worksite: Worksite, targets: Mapping[int, Target], commanded: int) -> NDArray[np.uint8]:
     """Return the map of the dig area, (H, W, 3) uint8: the machine stands at its lower edge and looks up.
 
     Regions are squares, the commanded one in the colour of the mask; a ring stands for the middle of the cutting edge.
     """
     image = Image.fromarray(_heights(worksite))
     draw = ImageDraw.Draw(image)
-    for number, target in enumerate(targets):
+    for number, target in targets.items():
         corners = [tuple(_pixel(corner_w)) for corner_w in target.corners_w]
         is_it = number == commanded
         draw.polygon(corners, outline=TINT_RGB if is_it else _REGION_RGB, width=3 if is_it else 1)
