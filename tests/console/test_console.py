@@ -62,7 +62,7 @@ def test_a_policy_stops_when_the_page_is_not_heard_any_more_or_another_page_has_
     driver = open_driver(policy=Planted())
     driver.wish("work")
     assert driver.tick(times=3) == 3
-    driver.seat.sticks._at_s -= 2.0 * LOST_S  # a connection that is half open, a page that is hidden
+    driver.now_s += 2.0 * LOST_S  # a connection that is half open, a page that is hidden
     driver.console.tick()
     assert "not heard any more" in driver.state["words"]
     assert driver.state["mode"] == "still"

