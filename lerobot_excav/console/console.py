@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -49,6 +49,7 @@ class Console:
         grant: Does what a page wishes, or raises an `ExcavError` that says why not.
         size: Height and width of the pictures [px].
         speed: How fast the world is beside real time; below 1 it is slow motion.
+        offers: What the page may wish for; by default what makes sense with this policy and this recorder.
     """
 
     def __init__(
@@ -62,12 +63,14 @@ class Console:
         grant: Callable[["Console", Wish], None],
         size: tuple[int, int],
         speed: float = 1.0,
+        offers: Sequence[str] | None = None,
     ) -> None:
         self.env, self.seat, self.feed, self.pilot, self.recorder = env, seat, feed, pilot, recorder
         self._grant, self._speed_asked = grant, speed
+        self._offers = list(self._default_offers() if offers is None else offers)
         self._views = LiveViews(env, height=size[0], width=size[1])
         self._words, self._is_fault = "", False
-        self._start: dict[str, int] | None = None  # of the running episode
+        self._start: dict[str, Any] | None = None  # of the running episode
         self._pictures: dict[str, bytes] = {}
         self._marks: list[dict[str, Any]] = []
         self._is_new = True  # whether the scene looks otherwise than shown
@@ -76,7 +79,7 @@ class Console:
         self._share = 1.0  # of the speed that is asked for, as far as this machine reaches it
         self._acted: NDArray[np.float32] | None = None
 
-    def start(self, **options: int) -> None:
+    def start(self, **options: Any) -> None:
         """Begin an episode; `options` are those of the environment's `reset`.
 
         Raises:
@@ -247,22 +250,16 @@ class Console:
             "policy": self.pilot.policy_name,
             "taken_over": self.pilot.has_taken_over,
             "recording": self.recorder.state(),
-            "offers": self._offers(),
+            "offers": self._offers,
             "words": self._words,
             "fault": self._is_fault,
             "speed": round(self._speed_asked * self._share, 2),
         }
 
-    def _offers(self) -> list[str]:
-        """Return which wishes the page may show at all."""
-        recording = ("record", "finish", "keep", "again", "skip", "complete") if self.recorder.recording else ()
-        return [
-            "point",
-            "paint",
-            "target",
-            "start",
-            "drive",
-            "stop",
-            *(["work"] if self.pilot.policy_name else []),
-            *recording,
-        ]
+    def _default_offers(self) -> list[str]:
+        offers = ["point", "paint", "target", "start", "drive", "stop"]
+        if self.pilot.policy_name is not None:
+            offers.append("work")
+        if self.recorder.recording is not None:
+            offers += ["record", "finish", "keep", "again", "skip", "complete"]
+        return offers

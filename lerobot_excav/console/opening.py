@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.console.console import Console
-from lerobot_excav.console.pilot import Pilot
+from lerobot_excav.console.pilot import Actor, Pilot
 from lerobot_excav.console.recorder import Recorder
 from lerobot_excav.console.recording import Recording
 from lerobot_excav.console.wishes import grant, show_next
@@ -19,7 +19,6 @@ from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import ENDLESS_FRAMES, TaskSettings
 from lerobot_excav.errors import ConfigurationError, require
-from lerobot_excav.evaluation.audit.actor import Actor
 from lerobot_excav.page.access import Access
 from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed

@@ -1,6 +1,6 @@
 """Who acts now: nobody, a person with the sticks, or a policy."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,13 +8,22 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.sticks import Legend, StickControl
 from lerobot_excav.errors import ConfigurationError, ExcavError, require
-from lerobot_excav.evaluation.audit.actor import Actor
 from lerobot_excav.page.drivers_seat import DriversSeat
 
 STILL, DRIVE, WORK = "still", "drive", "work"
 """Time stands still; a person drives; a policy works."""
 
 Action = NDArray[np.float32]
+
+
+class Actor(Protocol):
+    """Whoever may work by itself: a policy, or the actions of a recording."""
+
+    def begin(self, env: MaskedTaskEnv[Any, Any]) -> None:
+        """Start from the present state, without a memory of what was before."""
+
+    def act(self, env: MaskedTaskEnv[Any, Any], observation: dict[str, Any]) -> Action | None:
+        """Return the next action, (actions,); None when there is nothing more to do."""
 
 
 class Pilot:
@@ -101,12 +110,15 @@ class Pilot:
         self._waits, self.sticks_number = False, number
         return self._sticks.action(axes, response)
 
-    def _act_of_policy(self, observation: dict[str, Any]) -> Action:
+    def _act_of_policy(self, observation: dict[str, Any]) -> Action | None:
         assert self._policy is not None  # or `work` had refused
         try:
             action = self._policy.act(self._env, observation)
         except Exception as error:  # it is someone else's
             raise ExcavError(f"the policy {self.policy_name} has failed: {' '.join(str(error).split())}") from error
+        if action is None:  # a recording is over
+            self.rest()
+            return None
         if not np.isfinite(action).all():
             raise ExcavError(f"the policy {self.policy_name} has failed: its action is not finite")
         return action

@@ -14,17 +14,26 @@ Examples:
       ... of piles as they are drawn and after 4 cycles
   lerobot-excav console --env.type=fr5_grasp
       the arm
+  lerobot-excav console --view=outputs/by_hand --episode=3
+      look at a recorded episode: the simulation plays its actions again
 """
 
 import webbrowser
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from lerobot_excav.datasets.record.demonstration_settings import MOST_SCENES
+from lerobot_excav.datasets.record.demonstration_settings import MOST_SCENES, DemonstrationSettings
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE
+from lerobot_excav.errors import require
+from lerobot_excav.page.access import Access, free_port
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 from lerobot_excav.setting import setting
+
+if TYPE_CHECKING:
+    from lerobot_excav.console.opening import OpenConsole
 
 
 @dataclass(kw_only=True)
@@ -44,6 +53,10 @@ class ConsoleArguments(Arguments):
     stages: str = setting(
         "Stages at which every scene is recorded, such as 0,4,8: after so many cycles dug before", default="0"
     )
+    view: Path | None = setting(
+        "Dataset to look at: the simulation plays a recorded episode again, in its own environment", default=None
+    )
+    episode: int = setting("With --view: the episode that is shown first", default=0, low=0)
     out: Path | None = setting("Folder of the dataset to record; left out: nothing is recorded", default=None)
     host: str = setting(
         "Address to listen at; another than 127.0.0.1 lets other machines in, which need the token too",
@@ -58,10 +71,30 @@ class ConsoleArguments(Arguments):
 
 def run(arguments: ConsoleArguments) -> int:
     """Serve the page until Ctrl-C."""
-    from lerobot_excav.console.opening import open_console, until_interrupted
-    from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
-    from lerobot_excav.page.access import Access, free_port
+    from lerobot_excav.console.opening import until_interrupted
 
+    access = Access(host=arguments.host, port=arguments.port or free_port(arguments.host))
+    with until_interrupted() as is_over, _opened(arguments, access) as opened:
+        print(f"the console is at {opened.address}", flush=True)
+        print("Ctrl-C ends it.", flush=True)
+        if arguments.open_browser:
+            webbrowser.open(opened.address)
+        opened.console.run(is_over)
+    print("ended")
+    return 0
+
+
+def _opened(arguments: ConsoleArguments, access: Access) -> AbstractContextManager["OpenConsole"]:
+    """Open what was asked for: a console, or the view of a recording."""
+    from lerobot_excav.console.opening import open_console
+    from lerobot_excav.console.viewing import open_viewer
+
+    shown: dict[str, Any] = {"size": (arguments.height, arguments.width), "speed": arguments.speed}
+    require(arguments.view is not None or arguments.episode == 0, f"--episode={arguments.episode} needs --view=DATASET")
+    if arguments.view is not None:
+        unfit = [name for name in ("policy", "out") if getattr(arguments, name) is not None]
+        require(not unfit, f"--view={arguments.view} shows a recording; leave --{' and --'.join(unfit)} out")
+        return open_viewer(arguments.view, arguments.episode, access=access, **shown)
     schedule = DemonstrationSettings(
         env=task_settings(arguments.env),
         first_scene=arguments.first_scene,
@@ -70,21 +103,7 @@ def run(arguments: ConsoleArguments) -> int:
         stages=arguments.stages,
         keep_failures=True,  # whoever drives decides
     )
-    access = Access(host=arguments.host, port=arguments.port or free_port(arguments.host))
-    size = (arguments.height, arguments.width)
-    with (
-        until_interrupted() as is_over,
-        open_console(
-            schedule, access=access, size=size, speed=arguments.speed, policy=arguments.policy, out=arguments.out
-        ) as opened,
-    ):
-        print(f"the console is at {opened.address}", flush=True)
-        print("Ctrl-C ends it.", flush=True)
-        if arguments.open_browser:
-            webbrowser.open(opened.address)
-        opened.console.run(is_over)
-    print("ended")
-    return 0
+    return open_console(schedule, access=access, policy=arguments.policy, out=arguments.out, say=print, **shown)
 
 
 ARGUMENTS = ConsoleArguments

@@ -62,7 +62,7 @@ function showHeader() {
   const stage = state.scene.stage ? `, ${state.scene.stage} cycles dug` : "";
   $("scene").textContent = `scene ${state.scene.scene_id} of ${state.scene.set}${stage}: ${state.task_description}`;
   showStart();
-  const names = { still: "time stands still", drive: state.taken_over ? "you drive, taken over" : "you drive", work: "the policy works" };
+  const names = { still: "time stands still", drive: state.taken_over ? "you drive, taken over" : "you drive", work: state.offers.includes("drive") ? "the policy works" : "the recording plays" };
   $("mode").textContent = names[state.mode];
   $("mode").dataset.mode = state.mode;
   $("driver").textContent = { you: "you have the controls", nobody: "nobody has the controls" }[state.driver] ?? "another page has the controls";
@@ -76,7 +76,8 @@ function showHeader() {
     if (part.dataset.wish) part.disabled = !isDriver();
   }
   $("work").disabled = $("once").disabled = !isDriver() || state.over;
-  $("work").textContent = state.taken_over ? "Hand back" : "Let it work";
+  const isShown = !state.offers.includes("drive") && state.offers.includes("work"); // a recording
+  $("work").textContent = isShown ? "Play" : state.taken_over ? "Hand back" : "Let it work";
   if (!state.task.startsWith("Clear")) $("once").hidden = true;
   if (state.recording) $("restart").hidden = true; // the recording has a button of its own
   $("drive").disabled = !isDriver() || state.over;
