@@ -201,6 +201,6 @@ def test_the_caption_tells_the_outcome_once_it_is_decided(make, monkeypatch, is_
     for is_over in (False, True):
         *_, truncated, _ = env.step(middle(env))
         assert truncated == is_over
-        caption = env._caption()
+        caption = env.caption
         assert (caption.outcome is not None) == is_over
         assert caption.is_success == (is_success and is_over)

@@ -55,11 +55,14 @@ class Clearing:
         self._events.begin_cycle()
 
     def recommand(self, target_id: int, proposal: Proposal) -> None:
-        """Command another of the proposed regions within the cycle; if nothing is loaded yet, its time begins again."""
+        """Command another of the proposed regions within the cycle."""
         self._proposal = proposal
+        self.cycle.retarget(target_id)
+
+    def begin_time_again(self) -> None:
+        """Give the running cycle its whole time again, unless it has loaded something."""
         if self.cycle.onset_time_s is None:
             self._began_s = self._events.time_s
-        self.cycle.retarget(target_id)
 
     def update(self) -> None:
         """Take in the tick that has just passed."""

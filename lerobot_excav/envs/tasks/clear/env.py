@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.masks.source import MaskSource
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
+from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.planner.candidates import rate
 from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets, proposal_of
 from lerobot_excav.envs.tasks.planner.score_overlay import with_scores
@@ -152,6 +154,13 @@ class ClearEnv(ExcavatorEnv):
         target_id = super()._target_at(place_w)
         self.plan = replace(self.plan, proposals=(*self.plan.proposals, proposal_of(rated, 0)))
         return target_id
+
+    @override
+    def _point(self, target_id: int, source: MaskSource) -> Seen:
+        """Command a target, whose cycle has its whole time from now on: a person may have thought for long."""
+        seen = super()._point(target_id, source)
+        self._clearing.begin_time_again()
+        return seen
 
     @property
     @override

@@ -187,7 +187,7 @@ def test_the_caption_tells_load_and_deposit(env):
     env.reset(options={"scene_id": 0, "target_id": 0})
     state = env.cycle.state
     state.bucket_mass_kg, state.deposited_mass_kg = 312.4, 95.6
-    words = env._caption().words
+    words = env.caption.words
     assert words[:2] == ("load 312 kg", "in the box 96 kg")
     assert "0.0 s" in words
 
@@ -205,4 +205,4 @@ def test_a_failure_is_told_as_soon_as_it_is_certain(env, hit, contacts, deposite
     env.reset(options={"scene_id": 0, "target_id": 0})
     env.cycle.target_hit = hit
     env.cycle.state.hard_target_contacts, env.cycle.state.deposited_mass_kg = contacts, deposited
-    assert env._caption().outcome == failure
+    assert env.caption.outcome == failure
