@@ -28,7 +28,8 @@ from lerobot_excav.datasets.record.demonstration_settings import MOST_SCENES, De
 from lerobot_excav.envs.tasks.registry import task_settings
 from lerobot_excav.envs.tasks.settings import LAST_SCENE, TARGETS_PER_SCENE
 from lerobot_excav.errors import require
-from lerobot_excav.page.access import Access, free_port
+from lerobot_excav.page.access import Access
+from lerobot_excav.page.settings import PageSettings
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 from lerobot_excav.setting import setting
 
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class ConsoleArguments(Arguments):
+class ConsoleArguments(Arguments, PageSettings):
     """Arguments of `lerobot-excav console`."""
 
     env: EnvironmentChoice = field(default_factory=EnvironmentChoice.default)
@@ -58,13 +59,6 @@ class ConsoleArguments(Arguments):
     )
     episode: int = setting("With --view: the episode that is shown first", default=0, low=0)
     out: Path | None = setting("Folder of the dataset to record; left out: nothing is recorded", default=None)
-    host: str = setting(
-        "Address to listen at; another than 127.0.0.1 lets other machines in, which need the token too",
-        default="127.0.0.1",
-    )
-    port: int = setting("Port of the page; 0 takes a free one", default=8750, low=0, high=65535)
-    height: int = setting("Height of the live pictures [px]", default=480, low=96, high=1440)
-    width: int = setting("Width of the live pictures [px]", default=640, low=128, high=1920)
     speed: float = setting("How fast the world is beside real time; 0.5 is half as fast", default=1.0, low=0.1, high=4)
     open_browser: bool = setting("Whether to open the page in this machine's browser", default=False)
 
@@ -73,7 +67,7 @@ def run(arguments: ConsoleArguments) -> int:
     """Serve the page until Ctrl-C."""
     from lerobot_excav.console.opening import until_interrupted
 
-    access = Access(host=arguments.host, port=arguments.port or free_port(arguments.host))
+    access = arguments.access()
     with until_interrupted() as is_over, _opened(arguments, access) as opened:
         print(f"the console is at {opened.address}", flush=True)
         print("Ctrl-C ends it.", flush=True)

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, override
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.tasks.registry import task_of_robot
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.page.access import Access, free_port
 from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed
 from lerobot_excav.page.live_views import LiveViews
@@ -75,8 +74,7 @@ class WebTeleoperator(SimulationTeleoperator):
         """
         if self.is_connected:
             raise DeviceError(f"the page is served already, at {self.address}")
-        config = self.config
-        access = Access(host=config.host, port=config.port or free_port(config.host))
+        access = self.config.access()
         self._served.enter_context(PageServer(access, self._feed, self._seat).running())
         self.address = access.address
         logger.warning(f"Open {self.address} in a browser to drive the robot.")
