@@ -332,8 +332,9 @@ COMMAND_TABLES = {
         **{"n_action_steps": each(whole(1)), "ensemble": optional(number(-10, 10)), "seed": whole(0, SEED)},
     },
     "console": {
-        **dict.fromkeys(("policy", "out"), optional(path)),
+        **dict.fromkeys(("policy", "out", "view"), optional(path)),
         **{
+            "episode": whole(0),
             "first_scene": whole(0, ENDLESS).beside(scenes=1),
             "scenes": whole(1, 100_000),
             "targets": optional(whole(1, 4)),
