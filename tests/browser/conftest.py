@@ -55,8 +55,9 @@ def open_page(browser):
         page = context.new_page()
         if pad:
             page.add_init_script(STUBBED_PAD)
-        page.on("pageerror", lambda error: faults.append(str(error)))
-        page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
+        # Once the console has ended, the page looks for it in vain.
+        page.on("pageerror", lambda error: served.is_over or faults.append(str(error)))
+        page.on("console", lambda message: message.type != "error" or served.is_over or faults.append(message.text))
         page.set_default_timeout(30_000)
         page.goto(path or served.address)
         return page
@@ -76,7 +77,7 @@ def serving(env_type="excavator", *, env=None, out=None, policy=None, speed=1.0,
         env_type, {**fast, **(env or {})}, keep_failures=True, **{"scenes": 1, **schedule}
     )
     access = Access(host="127.0.0.1", port=free_port("127.0.0.1"))
-    served, ready, over = SimpleNamespace(error=None), threading.Event(), threading.Event()
+    served, ready, over = SimpleNamespace(error=None, is_over=False), threading.Event(), threading.Event()
 
     def serve():
         try:
@@ -97,6 +98,7 @@ def serving(env_type="excavator", *, env=None, out=None, policy=None, speed=1.0,
         if served.error is None:
             yield served
     finally:
+        served.is_over = True
         over.set()
         thread.join(timeout=30.0)
         if served.error is not None:

@@ -121,7 +121,7 @@ def test_a_click_and_a_painted_region_are_commanded(open_page):
 
 
 def test_a_policy_works_keys_take_over_it_is_handed_back_and_stopped(open_page, monkeypatch, tmp_path):
-    monkeypatch.setattr(opening, "_policy", lambda checkpoint: Planted())
+    monkeypatch.setattr(opening, "_policy", lambda *_: Planted())
     with serving(policy=tmp_path) as served:
         page = open_page(served)
         page.locator("#work").click()
@@ -174,7 +174,7 @@ def test_a_page_that_is_hidden_lets_go(open_page):
 
 
 def test_a_tab_that_is_closed_stops_the_machine_and_another_one_can_take_over(open_page, monkeypatch, tmp_path):
-    monkeypatch.setattr(opening, "_policy", lambda checkpoint: Planted())
+    monkeypatch.setattr(opening, "_policy", lambda *_: Planted())
     with serving(policy=tmp_path) as served:
         first, second = open_page(served), open_page(served)
         expect(first.locator("#driver")).to_have_text("you have the controls")

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 TRAIN = (
     *("--policy.type=mask_act", "--policy.preset=fast", "--policy.n_encoder_layers=1", "--policy.chunk_size=2"),
     *("--policy.n_action_steps=1", "--policy.actions_per_token=1", "--policy.device=cpu", "--policy.push_to_hub=false"),
-    *("--batch_size=2", "--steps=20", "--num_workers=0", "--log_freq=10", "--eval_freq=0", "--save_checkpoint=false"),
+    *("--batch_size=2", "--steps=20", "--num_workers=0", "--log_freq=10", "--save_checkpoint=false"),
 )
 
 
