@@ -14,7 +14,7 @@ JOBS ?= 1
 # The newest Python that pyproject.toml names; pyenv gives a version only when asked for it.
 PYTHON_NEWEST ?= $(shell PYENV_VERSION=3.13 python3.13 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3.13)
 # What differs between versions of what we depend on: simulators, pictures, the interfaces of LeRobot and Gymnasium.
-LOWEST_TESTS ?= tests/contract tests/envs/machines tests/envs/tasks tests/envs/configs
+LOWEST_TESTS ?= tests/contract tests/envs/machines tests/envs/tasks tests/envs/configs tests/page
 PYTEST := -m pytest -n 2 --dist=worksteal
 TOOLS := build hatchling hypothesis pytest pytest-xdist snakemake
 
