@@ -35,7 +35,7 @@ class Access:
     @property
     def address(self) -> str:
         """Address of the page, with the token."""
-        host = "127.0.0.1" if self.host in ("0.0.0.0", "::") else self.host
+        host = outward_address() if self.host in ("0.0.0.0", "::") else self.host
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/?token={self.token}"
 
     def knows_token(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
@@ -77,6 +77,16 @@ def _is_address(host: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def outward_address() -> str:
+    """Return the address under which other machines most likely reach this one; that of loopback if none does."""
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(("192.0.2.1", 9))  # chooses a way out; nothing is sent
+            return str(probe.getsockname()[0])
+    except OSError:
+        return "127.0.0.1"
 
 
 def free_port(host: str) -> int:

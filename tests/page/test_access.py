@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.errors import DeviceError
-from lerobot_excav.page.access import Access, free_port, is_loopback
+from lerobot_excav.page.access import Access, free_port, is_loopback, outward_address
 
 LOCAL = Access(host="127.0.0.1", port=8750, token="secret")
 OPEN = Access(host="0.0.0.0", port=8750, token="secret")
@@ -15,7 +15,8 @@ OPEN = Access(host="0.0.0.0", port=8750, token="secret")
 
 def test_the_address_holds_the_token_and_tokens_differ():
     assert LOCAL.address == "http://127.0.0.1:8750/?token=secret"
-    assert OPEN.address == "http://127.0.0.1:8750/?token=secret"
+    assert OPEN.address == f"http://{outward_address()}:8750/?token=secret"
+    assert OPEN.is_for_us({"host": f"{outward_address()}:8750"})
     tokens = {Access(host="::1", port=1).token for _ in range(20)}
     assert len(tokens) == 20
     assert min(map(len, tokens)) >= 20
