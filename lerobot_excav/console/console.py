@@ -189,17 +189,21 @@ class Console:
 
     def _carry_out(self, action: NDArray[np.float32]) -> None:
         command_frame = self.info["command_frame"]
-        self.recorder.add(self.observation, self.info, action, by_policy=self.pilot.mode == WORK)
-        self.observation, _, terminated, truncated, self.info = self.env.step(action)
-        self._acted, self._is_new = action, True
-        self.recorder.note(self.info)
-        if terminated or truncated:
+        self._step(action, by_policy=self.pilot.mode == WORK)
+        if self.env.is_over:
             self.finish_episode()
         elif self.info["command_frame"] != command_frame:
             self._note_command()
         elif self.recorder.length >= round(LONGEST_EPISODE_S * self.env.fps):
             self.finish_episode()
             self.say(f"finished: an episode is recorded for {LONGEST_EPISODE_S:.0f} s at most", is_fault=True)
+
+    def _step(self, action: NDArray[np.float32], *, by_policy: bool) -> None:
+        """Let a frame pass, and take it down."""
+        self.recorder.add(self.observation, self.info, action, by_policy=by_policy)
+        self.observation, *_, self.info = self.env.step(action)
+        self._acted, self._is_new = action, True
+        self.recorder.note(self.info)
 
     def _note_command(self) -> None:
         """Show the command that the task has just given."""
@@ -216,10 +220,7 @@ class Console:
         self.pilot.rest()
         if self.recorder.is_running and not self.env.is_over and self.info["command_frame"] == self.env.frame > 0:
             # A replay gives no command after the last frame, so one more passes under it, or its task state differs.
-            hold = np.asarray(self.env.holding_action(), np.float32)
-            self.recorder.add(self.observation, self.info, hold, by_policy=by_policy)
-            self.observation, *_, self.info = self.env.step(hold)
-            self.recorder.note(self.info)
+            self._step(np.asarray(self.env.holding_action(), np.float32), by_policy=by_policy)
         self.recorder.finish(self.env.task_description, success=self.env.is_success)
         caption = self.env.caption
         self.say(f"the episode is over: {caption.outcome or 'the task is not done'}", is_fault=not self.env.is_success)

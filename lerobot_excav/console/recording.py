@@ -4,7 +4,6 @@ As with `lerobot-excav demos`, a dataset `OUT` is a folder `OUT.partial` while i
 files there, so what kills the console takes the episode in hand at most, and the same command goes on.
 """
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -89,20 +88,21 @@ class Recording:
             DatasetError: No episode is kept.
         """
         from lerobot_excav.datasets.pairs.paired_index import write_index
-        from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
+        from lerobot_excav.datasets.record.assembly import append_episode, close_dataset, create_dataset
 
         kept = self._kept
         if not kept:
             raise DatasetError("no episode is kept yet, so there is nothing to write; record one first")
-        if self._partial.dataset.exists():  # of a try that failed
-            shutil.rmtree(self._partial.dataset)
+        self._partial.remove_unfinished_dataset()  # of a try that failed
         longest = max(outcome["frames"] for outcome in self._outcomes.values() if outcome is not None)
         dataset = create_dataset(self._partial.dataset, self.settings, longest=longest)
-        for number, pair in enumerate(kept, start=1):
-            append_episode(dataset, self._store.read(pair), self.settings)
-            progress(number, len(kept))
-        dataset.finalize()
-        shutil.rmtree(self._partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
+        try:
+            for number, pair in enumerate(kept, start=1):
+                append_episode(dataset, self._store.read(pair), self.settings)
+                progress(number, len(kept))
+        finally:
+            dataset.writer.stop_image_writer()  # or its threads would go on writing into a folder that is given up
+        close_dataset(dataset)
         write_index(self._partial.dataset)
         self._partial.dataset.rename(self.out)
         self._partial.clear()

@@ -1,5 +1,6 @@
 """Writing finished episodes as a LeRobot dataset, through its public interface."""
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -109,6 +110,12 @@ def append_episode(dataset: LeRobotDataset, episode: Episode, settings: Demonstr
         dataset.add_frame({"task": episode.task, **constant, **varying, **images})
     with without_progress_bars():
         dataset.save_episode()
+
+
+def close_dataset(dataset: LeRobotDataset) -> None:
+    """Complete the files of a dataset that all episodes were added to; from here on it can be read."""
+    dataset.finalize()
+    shutil.rmtree(Path(dataset.root) / "images", ignore_errors=True)  # the library's empty staging folders
 
 
 @contextmanager

@@ -6,7 +6,6 @@ are assembled in the order of the settings, so neither the number of workers nor
 """
 
 import errno
-import shutil
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
@@ -110,7 +109,7 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
     ):
         futures = _start(pool, progress, settings, partial.episodes)
         # LeRobot takes seconds to load; by now the workers are at work.
-        from lerobot_excav.datasets.record.assembly import append_episode, create_dataset
+        from lerobot_excav.datasets.record.assembly import append_episode, close_dataset, create_dataset
 
         dataset = create_dataset(partial.dataset, settings)
         # Else its threads go on writing into a folder that is given up.
@@ -125,8 +124,7 @@ def _fill(partial: PartialRun, settings: DemonstrationSettings, *, workers: int,
             outcomes.append(outcome)
     _require_any(outcomes, partial.folder)
     with _errors_name(partial.dataset):
-        dataset.finalize()
-    shutil.rmtree(partial.dataset / "images", ignore_errors=True)  # the library's empty staging folders
+        close_dataset(dataset)
     write_provenance(partial.dataset, settings, outcomes)
     write_index(partial.dataset)
     return outcomes

@@ -53,7 +53,7 @@ class PartialRun:
                 )
             self._match_settings()
             self.episodes.mkdir(exist_ok=True)
-            self._remove_unfinished_dataset()
+            self.remove_unfinished_dataset()
         except BaseException:
             self._lock.release()
             raise
@@ -119,7 +119,12 @@ class PartialRun:
         else:
             self._settings.require_same(DemonstrationSettings.from_record(record, source=path))
 
-    def _remove_unfinished_dataset(self) -> None:
+    def remove_unfinished_dataset(self) -> None:
+        """Remove what was assembled of the dataset so far, so that it can be assembled from the beginning.
+
+        Raises:
+            DatasetError: Files of someone else lie in it.
+        """
         # The library's files are complete only once it has closed them, so assembly starts again; it is the quick part.
         if not self.dataset.exists():
             return
