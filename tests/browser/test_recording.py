@@ -21,12 +21,26 @@ TRAIN = (
 )
 
 
+def hold(page, served, key, *, until_frames):
+    """Hold a key as a person does: once the sticks count, and again when a busy machine has lost them meanwhile."""
+    is_held = False
+
+    def enough():
+        nonlocal is_held
+        state = state_of(served)
+        if state["ready"] != is_held:
+            is_held = state["ready"]
+            (page.keyboard.down if is_held else page.keyboard.up)(key)
+        return state["recording"]["frames"] >= until_frames
+
+    until(enough, limit_s=60.0)
+    page.keyboard.up(key)
+
+
 def record_episode(page, served):
     page.keyboard.press("KeyR")
     until(lambda: state_of(served)["recording"]["running"])
-    page.keyboard.down("ArrowLeft")
-    until(lambda: state_of(served)["recording"]["frames"] >= 5)
-    page.keyboard.up("ArrowLeft")
+    hold(page, served, "ArrowLeft", until_frames=5)
     page.keyboard.press("KeyF")
     expect(page.locator("#judged")).to_be_visible()
     page.keyboard.press("KeyK")
