@@ -28,7 +28,7 @@ LAYERS = [
     ["policies"],
 ]
 SHARED = {"errors", "run_lock", "setting", "whole_file"}
-DATASET_LAYERS = ["format", "pairs", "record", "complete", "check"]
+DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card"]
 FREE = {"plugin", "scripts.export"}
 
 

@@ -29,6 +29,7 @@ from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 from lerobot_excav.robots.recording_command import operator_of, recorded_text, require_fitting_command
 from lerobot_excav.robots.recording_phases import RecordingPhases
+from lerobot_excav.robots.rerun_log import RerunLog
 from lerobot_excav.robots.session_log import SessionLog, default_path
 from lerobot_excav.robots.side_channel import NEXT_SCENE, REINITIALISE, is_pressed
 from lerobot_excav.robots.target_order import TargetOrder
@@ -62,6 +63,7 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self.cameras = dict.fromkeys(spec.cameras, (*self.settings.observation_size, 3))
         self.episode_count = 0
         self._env: MaskedTaskEnv[Any, Any] | None = None
+        self._rerun_log: RerunLog
         self._observation: dict[str, Any] = {}
         self._is_homing = False
         self._held_frames = 0
@@ -147,6 +149,9 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
         self._order = self._make_order()
         try:
             self._env = self.make_env()
+            self._rerun_log = RerunLog(
+                self._env, dict.fromkeys((*self.task_spec.state_names, *self.task_spec.action_names))
+            )
             self.start_scene()
         except Exception:
             if self._env is not None:
@@ -173,11 +178,14 @@ class SimulatedRobot(Robot):  # type: ignore[misc]  # LeRobot's classes are unty
     def get_observation(self) -> dict[str, Any]:
         """Return the current state and pictures; a second call without an action returns the same.
 
+        If a recording of Rerun is open, as with `--display_data=true`, what else there is to see goes there.
+
         Raises:
             DeviceError: The robot is not connected.
         """
         _ = self.env
         pixels = self._observation["pixels"]
+        self._rerun_log.show(self._observation)
         return {
             **dict(zip(self.task_spec.state_names, self._state, strict=True)),
             **{camera: pixels[camera].copy() for camera in self.cameras},

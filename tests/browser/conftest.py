@@ -11,18 +11,9 @@ import pytest
 from lerobot_excav.console import opening
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.page.access import Access, free_port
+from validation.page_operator.pad import STUBBED_PAD
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
-
-# A gamepad whose axes are those of `window.axes`, or of `window.plan` for the frame that the page shows.
-STUBBED_PAD = """
-window.pads = [{index: 0, id: "Stub (test)", connected: true, mapping: "standard", buttons: [],
-  get axes() {
-    const frame = Number(document.body?.dataset.frame ?? 0);
-    return window.plan?.[frame] ?? window.axes ?? [0, 0, 0, 0];
-  }}];
-Object.defineProperty(navigator, "getGamepads", {value: () => window.pads});
-"""
 
 
 def executable():

@@ -2,6 +2,7 @@
 
 import re
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -10,12 +11,10 @@ from playwright.sync_api import expect
 from lerobot_excav.console import opening
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.page.sticks import LOST_S
+from validation.page_operator.pad import planned
 
-from ..console.conftest import Planted, axes_of
+from ..console.conftest import Planted
 from .conftest import serving
-
-DEAD_ZONE = 0.08
-"""That of the page, until a person sets another."""
 
 pytestmark = pytest.mark.slow
 
@@ -37,29 +36,14 @@ def brightness(page, canvas):
     return page.locator(canvas).evaluate(script)
 
 
-def undone(axes):
-    """Return deflections that the page's dead zone turns into the given axes."""
-    return [float(np.sign(a) * (DEAD_ZONE + (1.0 - DEAD_ZONE) * abs(a))) if abs(a) > 1e-6 else 0.0 for a in axes]
-
-
-def planned(served):
+def planned_for(served):
     """Return the sticks, frame by frame, of the scripted operator in the scene that is shown."""
     env = served.console.env
     world = task_of_settings(env.settings).make_env(
         obs_type="agent_pos", render_mode=None, **{**env.settings.as_dict(), "episode_length": None}
     )
-    world.reset(options={"scene_id": env.scene_id, "stage": env.stage, "target_id": env.target_id})
-    operator = env.task_spec.make_operator(np.random.default_rng(0))
-    operator.reset(world)
-    plan, is_over = [], False
-    while not is_over:
-        action = operator.act(world)
-        plan.append(undone(axes_of(action)))
-        _, _, terminated, truncated, _ = world.step(action)
-        is_over = terminated or truncated
-    world.close()
-    moved = next(frame for frame, axes in enumerate(plan) if any(axes))
-    return plan[moved:]  # time stands still until the first motion
+    with closing(world):
+        return planned(world, scene_id=env.scene_id, stage=env.stage, target_id=env.target_id).sticks
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 800)])
@@ -85,7 +69,7 @@ def test_the_page_shows_views_targets_and_the_legend_of_the_sticks(open_page, tm
 def test_a_gamepad_drives_a_whole_cycle_as_the_operator_does(open_page):
     with serving(speed=0.5) as served:
         page = open_page(served, pad=True)
-        plan = planned(served)
+        plan = planned_for(served)
         expect(page.locator("#device")).to_have_text("Stub")
         until(lambda: state_of(served)["ready"])
         page.locator("#drive").click()

@@ -18,6 +18,7 @@ from lerobot_excav.page.drivers_seat import DriversSeat
 from lerobot_excav.page.feed import Feed
 from lerobot_excav.page.sticks import CENTRED_MESSAGES
 from lerobot_excav.page.wishes import Wish
+from validation.page_operator.pad import axes_of
 
 PAGE = 1
 CENTRE = [0.0] * 4
@@ -74,12 +75,6 @@ class Driver:
     @property
     def pictures(self):
         return self.console.feed._moment.pictures
-
-
-def axes_of(action):
-    """Return the ISO sticks that ask for an action (4,): swing, boom, arm, bucket."""
-    swing, boom, arm, bucket = (float(value) for value in action)
-    return [-swing, -arm, bucket, boom]
 
 
 class Planted:

@@ -309,6 +309,13 @@ COMMAND_TABLES = {
         **{**SCENES, **WORK, "json": optional(path)},
         "only": optional(one_of("environment", "writing", "demos")),
     },
+    "card": {
+        "dataset": optional(path),
+        **dict.fromkeys(("title", "push_to"), optional(text)),
+        "license": text,
+        **dict.fromkeys(("replays", "seed"), whole(0)),
+        "private": optional(flag),
+    },
     "qc": {"dataset": optional(path), "episodes": optional(each(whole(0))), "replays": whole(0), "seed": whole(0)},
     "index": {
         **dict.fromkeys(("dataset", "session", "out"), optional(path)),

@@ -152,6 +152,19 @@ def test_nothing_is_made_for_people_before_they_look(make):
     assert env._view is None
 
 
+def test_gymnasium_shows_every_step_in_a_window(spec, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    pygame = pytest.importorskip("pygame")
+    window = gym.make(spec.gym_id, render_mode="human", disable_env_checker=True, **SMALL)
+    window.reset(options={"scene_id": 0, "target_id": 0})
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    assert np.array_equal(shown, window.unwrapped.render())
+    window.step(window.unwrapped.holding_action())
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    assert np.array_equal(shown, window.unwrapped.render())
+    window.close()
+
+
 def test_without_a_render_mode_there_is_no_picture(make):
     assert start(make(render_mode=None)).render() is None
 

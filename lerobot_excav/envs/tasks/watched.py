@@ -11,6 +11,7 @@ from lerobot_excav.envs.machines.view import View
 from lerobot_excav.envs.masks.source import TargetMask
 from lerobot_excav.envs.tasks.caption import Caption, captioned
 from lerobot_excav.envs.tasks.film import Film
+from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.settings import RenderSettings, TaskSettings
 
 
@@ -136,6 +137,10 @@ class WatchedEnv(ABC):
 
     def plan_view(self) -> NDArray[np.uint8] | None:
         """Return a map of the scene from above, (H, W, 3) uint8, which costs little; None if the task draws none."""
+        return None
+
+    def relief(self) -> Relief | None:
+        """Return the surface of the ground now; None if the task has none that changes."""
         return None
 
     def _close_views(self) -> None:

@@ -16,9 +16,10 @@ from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
-from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan
+from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan, height_colours
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
@@ -168,6 +169,13 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         """Return the dig area from above, the machine below it; see `plan_view.draw_plan`."""
         shown = dict(enumerate(self.scene.targets[: self.task_spec.target_count])) | {self.target_id: self.target}
         return draw_plan(self.worksite, shown, self.target_id)
+
+    @override
+    def relief(self) -> Relief:
+        """Return the soil of the dig area."""
+        soil = self.worksite.soil
+        heights_m = soil.heights_m.copy()
+        return Relief(x_w=soil.x_w, y_w=soil.y_w, height_m=heights_m, rgb=height_colours(heights_m))
 
     @override
     def places_w(self) -> NDArray[np.float64]:

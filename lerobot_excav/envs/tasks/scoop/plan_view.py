@@ -39,12 +39,17 @@ def draw_plan(worksite: Worksite, targets: Mapping[int, Target], commanded: int)
     return np.asarray(image)
 
 
-def _heights(worksite: Worksite) -> NDArray[np.uint8]:
-    """Return the heights as colours, turned so that the machine's forward axis points up and its left is left."""
-    share = np.clip(worksite.soil.heights_m / HIGHEST_M, 0.0, 1.0) * (len(_COLOURS) - 1)
+def height_colours(heights_m: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return heights of any shape (...) [m] as colours, (..., 3) uint8: the higher, the lighter."""
+    share = np.clip(heights_m / HIGHEST_M, 0.0, 1.0) * (len(_COLOURS) - 1)
     low = np.minimum(share.astype(int), len(_COLOURS) - 2)
     part = (share - low)[..., None]
-    colours = ((1.0 - part) * _COLOURS[low] + part * _COLOURS[low + 1]).astype(np.uint8)
+    return np.asarray((1.0 - part) * _COLOURS[low] + part * _COLOURS[low + 1]).astype(np.uint8)
+
+
+def _heights(worksite: Worksite) -> NDArray[np.uint8]:
+    """Return the heights as colours, turned so that the machine's forward axis points up and its left is left."""
+    colours = height_colours(worksite.soil.heights_m)
     height, width = (round(PIXELS_PER_M * extent) for extent in DIG_AREA_EXTENT_M)
     turned = colours[::-1, ::-1]  # rows along x, columns along y, both from the far end
     return np.asarray(Image.fromarray(np.ascontiguousarray(turned)).resize((width, height), Image.Resampling.BILINEAR))

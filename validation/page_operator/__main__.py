@@ -1,0 +1,142 @@
+"""Replay the scripted operator through the console's page, in a browser, and count its successes.
+
+Every cycle of `val` is played twice from the same start: by the operator itself, and by a gamepad in headless Chromium
+that holds the operator's sticks for the frame that the page shows. Finished cycles are kept in FILE, and the same
+command goes on after an interruption. Run it from the repository's root, with nothing else at work.
+
+Examples:
+  python -m validation.page_operator
+      25 scenes with 4 targets each (40 minutes)
+  python -m validation.page_operator --scenes=1 --file=outputs/page.jsonl
+      a quick look
+"""
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.evaluation.statistics import wilson_interval
+from validation.page_operator.onlooker import Onlooker
+from validation.page_operator.pad import STUBBED_PAD, Plan, planned
+
+FILE = Path("results", "scoop", "page_operator.jsonl")
+SCENE_SET = "val"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+CONSOLE = (
+    "import sys; from lerobot_excav.scripts.main import main; sys.exit(main(sys.argv[1:]))",
+    *("console", "--env.type=excavator", f"--env.scene_set={SCENE_SET}", "--port=0"),
+)
+
+
+@contextmanager
+def console() -> Iterator[str]:
+    """Run the command in a process of its own; its address."""
+    with subprocess.Popen([sys.executable, "-u", "-c", *CONSOLE], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            said = next(line for line in process.stdout if "the console is at" in line)
+            yield said.split()[-1]
+        finally:
+            process.terminate()
+
+
+def play(page: Any, onlooker: Onlooker, plan: Plan, *, scene_id: int, target_id: int) -> dict[str, Any]:
+    """Play a cycle through the page, from choosing the scene on; return its outcome as data."""
+    page.evaluate("window.plan = null")
+    page.locator("#start input[name=scene_id]").fill(str(scene_id))
+    page.locator("#start button").click()
+    onlooker.wait(lambda state: state["scene"]["scene_id"] == scene_id and state["frame"] == 0 and not state["over"])
+    overlay = page.locator("#overlay")
+    box = overlay.bounding_box()
+    place = next(t for t in onlooker.state["targets"] if t["number"] == target_id)
+    overlay.click(position={"x": place["x"] * box["width"], "y": place["y"] * box["height"]})
+    onlooker.wait(lambda state: state["target"] == target_id and state["ready"])
+    page.locator("#drive").click()
+    page.evaluate("plan => { window.plan = plan; }", plan.sticks)
+    frames = 2 * len(plan.sticks)
+    onlooker.wait(lambda state: state["over"] or state["frame"] >= frames, limit_s=300.0)
+    state = onlooker.state
+    return {
+        "simulation_version": SCOOP.simulation_version,
+        "scene_id": scene_id,
+        "target_id": target_id,
+        "is_success": bool(state["over"] and state["success"]),
+        "is_success_without_page": plan.is_success,
+        "frames": state["frame"],
+        "frames_without_page": len(plan.sticks),
+        "speed": state["speed"],
+        "measured": state["measured"],
+        "delay": page.locator("#delay").inner_text(),
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        "python -m validation.page_operator",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--scenes", type=int, default=25, help="scenes, with 4 cycles each (default: 25)")
+    parser.add_argument("--file", type=Path, default=FILE, help=f"finished cycles (default: {FILE})")
+    given = parser.parse_args(arguments)
+    if given.scenes < 1:
+        parser.error(f"--scenes={given.scenes}; allowed: 1 and above")
+    wanted = [(scene, target) for scene in range(given.scenes) for target in range(SCOOP.target_count)]
+    given.file.parent.mkdir(parents=True, exist_ok=True)
+    done = {(cycle["scene_id"], cycle["target_id"]) for cycle in read_cycles(given.file)}
+    missing = [pair for pair in wanted if pair not in done]
+    if missing:
+        _play_all(missing, given.file)
+    cycles = [cycle for cycle in read_cycles(given.file) if (cycle["scene_id"], cycle["target_id"]) in wanted]
+    print("\n".join(summary(cycles)))
+    return 0
+
+
+def _play_all(missing: list[tuple[int, int]], path: Path) -> None:
+    from playwright.sync_api import sync_playwright
+
+    executable = next(filter(None, map(shutil.which, BROWSERS)), None)
+    env = SCOOP.make_env(obs_type="agent_pos", render_mode=None, scene_set=SCENE_SET)
+    with console() as address, sync_playwright() as playwright, closing(Onlooker(address)) as onlooker, closing(env):
+        page = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox"]).new_page()
+        page.add_init_script(STUBBED_PAD)
+        page.goto(address)
+        page.get_by_text("you have the controls").wait_for()
+        for scene_id, target_id in missing:
+            plan = planned(env, scene_id=scene_id, target_id=target_id)
+            cycle = play(page, onlooker, plan, scene_id=scene_id, target_id=target_id)
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(cycle) + "\n")
+            words = "success" if cycle["is_success"] else "failed"
+            print(f"scene {scene_id}, target {target_id}: {words}; {cycle['delay']}", flush=True)
+
+
+def read_cycles(path: Path) -> list[dict[str, Any]]:
+    """Return the finished cycles of the present simulation, of a file that may not exist yet."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    cycles = [json.loads(line) for line in lines]
+    return [cycle for cycle in cycles if cycle["simulation_version"] == SCOOP.simulation_version]
+
+
+def summary(cycles: Sequence[dict[str, Any]]) -> list[str]:
+    """Return what came of the cycles, as lines."""
+    lines = []
+    for words, key in (("without the page", "is_success_without_page"), ("through the page", "is_success")):
+        successes, n = sum(cycle[key] for cycle in cycles), len(cycles)
+        interval = wilson_interval(successes, n)
+        lines.append(f"{words}: {successes} of {n}, {successes / n:.0%} [{interval.low:.0%}, {interval.high:.0%}]")
+    lost = [(c["scene_id"], c["target_id"]) for c in cycles if c["is_success_without_page"] and not c["is_success"]]
+    lines.append(f"lost through the page: {lost or 'none'}")
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())
