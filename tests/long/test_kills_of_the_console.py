@@ -10,8 +10,7 @@ import random
 import pytest
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
-
-from .console_process import ConsoleProcess, Page, until
+from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
 KILLS = int(os.environ.get("EXCAV_KILLS", "20"))
 SCENES = 3
@@ -19,18 +18,10 @@ FLAGS = ("--env.type=excavator", "--env.fidelity=fast", f"--scenes={SCENES}", "-
 
 
 def record(page, rng):
-    """Record and keep an episode of a few frames, as a person does; return how many are kept then."""
-    kept = page.state["recording"]["kept"]
-    page.wish("record")
-    until(lambda: page.state["recording"]["running"] and page.state["ready"])
-    page.axes = [rng.choice((-1.0, 1.0)), 0.0, 0.0, 0.0]
-    until(lambda: page.state["recording"]["frames"] >= 3)
-    page.axes = [0.0] * 4
-    page.wish("finish")
-    until(lambda: page.state["recording"]["verdict"] is not None)
-    page.wish("keep")
-    until(lambda: page.state["recording"]["kept"] > kept)
-    return kept + 1
+    """Record and keep an episode of a few frames; return how many are kept then."""
+    swing = rng.choice((-1.0, 1.0))
+    page.record(lambda _: [swing, 0.0, 0.0, 0.0], frames=3)
+    return page.state["recording"]["kept"]
 
 
 @pytest.mark.slow
@@ -38,7 +29,7 @@ def test_at_most_the_episode_in_hand_is_lost(tmp_path):
     out, rng, kept = tmp_path / "by_hand", random.Random(0), 0
     for kill in range(KILLS):
         console = ConsoleProcess(*FLAGS, f"--out={out}")
-        page = Page(console.address)
+        page = SocketPage(console.address, drives=True)
         found = page.state["recording"]["kept"]
         assert kept <= found <= kept + 1, (
             f"{found} kept after kill {kill}, {kept} before"
@@ -47,19 +38,7 @@ def test_at_most_the_episode_in_hand_is_lost(tmp_path):
         if kept < 4 * SCENES and rng.random() < 0.5:
             kept = record(page, rng)
         if kept < 4 * SCENES:
-            page.wish("record")
-            page.axes = [1.0, 0.0, 0.0, 0.0]
-            stop_at = rng.choice(("resetting", "running", "finished", "keeping"))
-            if stop_at != "resetting":
-                until(lambda page=page: page.state["recording"]["running"])
-            if stop_at in ("finished", "keeping"):
-                page.axes = [0.0] * 4
-                until(lambda page=page: page.state["ready"])
-                page.axes = [1.0, 0.0, 0.0, 0.0]
-                until(lambda page=page: page.state["recording"]["frames"] >= 3)
-                page.wish("finish")
-            if stop_at == "keeping":
-                page.wish("keep")
+            begin(page, rng.choice(("resetting", "running", "finished", "keeping")))
         else:
             page.wish("complete")
         console.kill()
@@ -73,15 +52,30 @@ def test_at_most_the_episode_in_hand_is_lost(tmp_path):
     assert len(report.episodes) == 4 * SCENES
 
 
+def begin(page, last):
+    """Begin an episode, and go on until some moment of it."""
+    page.wish("record")
+    if last == "resetting":
+        return
+    page.wait(lambda state: state["recording"]["running"] and state["ready"])
+    page.axes = [1.0, 0.0, 0.0, 0.0]
+    if last == "running":
+        return
+    page.wait(lambda state: state["recording"]["frames"] >= 3)
+    page.wish("finish")
+    if last == "keeping":
+        page.wish("keep")
+
+
 def finish(out, rng):
     """Let the same command record what is left, and write the dataset."""
     if out.exists():
         return
     console = ConsoleProcess(*FLAGS, f"--out={out}")
-    page = Page(console.address)
+    page = SocketPage(console.address, drives=True)
     while page.state["recording"]["left"]:
         record(page, rng)
     page.wish("complete")
-    until(lambda: page.state["recording"]["complete"])
+    page.wait(lambda state: state["recording"]["complete"])
     page.close()
     console.kill()

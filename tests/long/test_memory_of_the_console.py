@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from .console_process import ConsoleProcess, Page, until
+from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
 MINUTES = float(os.environ.get("EXCAV_MINUTES", "30"))
 WARM_PART = 0.2
@@ -20,15 +20,15 @@ MOST_GROWTH = 0.05
 @pytest.mark.slow
 def test_half_an_hour_of_driving_leaves_the_memory_as_it_is():
     console = ConsoleProcess("--env.type=excavator", "--env.fidelity=fast", "--env.scene_set=train")
-    page, rng = Page(console.address), random.Random(0)
+    page, rng = SocketPage(console.address, drives=True), random.Random(0)
     start_s, warm_mb, scene = time.monotonic(), None, 0
     try:
         while (passed := (time.monotonic() - start_s) / (60.0 * MINUTES)) < 1.0:
             page.axes = [0.0] * 4
             page.wish("start", scene_id=scene)
-            until(lambda scene=scene: page.state["scene"]["scene_id"] == scene)
+            page.wait(lambda state, scene=scene: state["scene"]["scene_id"] == scene)
             page.wish("drive")
-            until(lambda: page.state["mode"] == "drive" and page.state["ready"])
+            page.wait(lambda state: state["mode"] == "drive" and state["ready"])
             drive(page, rng, seconds=min(20.0, 6.0 * MINUTES))
             warm_mb = console.rss_mb() if warm_mb is None and passed > WARM_PART else warm_mb
             print(f"{60 * passed * MINUTES:.0f} s: {console.rss_mb():.0f} MB", flush=True)

@@ -14,40 +14,23 @@ Examples:
 import argparse
 import json
 import shutil
-import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.statistics import wilson_interval
-from validation.page_operator.onlooker import Onlooker
 from validation.page_operator.pad import STUBBED_PAD, Plan, planned
+from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
 FILE = Path("results", "scoop", "page_operator.jsonl")
 SCENE_SET = "val"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-CONSOLE = (
-    "import sys; from lerobot_excav.scripts.main import main; sys.exit(main(sys.argv[1:]))",
-    *("console", "--env.type=excavator", f"--env.scene_set={SCENE_SET}", "--port=0"),
-)
 
 
-@contextmanager
-def console() -> Iterator[str]:
-    """Run the command in a process of its own; its address."""
-    with subprocess.Popen([sys.executable, "-u", "-c", *CONSOLE], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            said = next(line for line in process.stdout if "the console is at" in line)
-            yield said.split()[-1]
-        finally:
-            process.terminate()
-
-
-def play(page: Any, onlooker: Onlooker, plan: Plan, *, scene_id: int, target_id: int) -> dict[str, Any]:
+def play(page: Any, onlooker: SocketPage, plan: Plan, *, scene_id: int, target_id: int) -> dict[str, Any]:
     """Play a cycle through the page, from choosing the scene on; return its outcome as data."""
     page.evaluate("window.plan = null")
     page.locator("#start input[name=scene_id]").fill(str(scene_id))
@@ -105,10 +88,12 @@ def _play_all(missing: list[tuple[int, int]], path: Path) -> None:
 
     executable = next(filter(None, map(shutil.which, BROWSERS)), None)
     env = SCOOP.make_env(obs_type="agent_pos", render_mode=None, scene_set=SCENE_SET)
-    with console() as address, sync_playwright() as playwright, closing(Onlooker(address)) as onlooker, closing(env):
+    flags = ("--env.type=excavator", f"--env.scene_set={SCENE_SET}")
+    with closing(env), ConsoleProcess(*flags) as console, sync_playwright() as playwright:
+        onlooker = SocketPage(console.address, drives=False)
         page = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox"]).new_page()
         page.add_init_script(STUBBED_PAD)
-        page.goto(address)
+        page.goto(console.address)
         page.get_by_text("you have the controls").wait_for()
         for scene_id, target_id in missing:
             plan = planned(env, scene_id=scene_id, target_id=target_id)
