@@ -8,6 +8,7 @@ RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 LOWEST := $(VENV)/lowest
 NEWEST := $(VENV)/newest
+JUDGES := $(VENV)/judges
 DEMO := outputs/demo
 CONSOLE ?= --env.task=Clear-v0 --policy=checkpoints/excavator_mask_act
 JOBS ?= 1
@@ -24,7 +25,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate lint type docs wheel clean
+.PHONY: help setup demo console tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate judge-data lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -95,6 +96,15 @@ fuzz: $(READY) ## random commands to machine and soil, and random changes of eve
 
 validate: $(READY) ## hold the soil to published experiments and to what nobody tuned; prints every gate (some 10 minutes)
 	@$(RUN)/python -m validation.soil
+
+judge-data: $(JUDGES)/.ready ## let lerobot-doctor and robovet judge datasets of both machines, by script, gamepad and page (ten minutes)
+	@OMP_NUM_THREADS=1 $(RUN)/python -m validation.judges --programs=$(JUDGES)/bin
+
+# Their dependencies differ from LeRobot's, so they have an environment of their own.
+$(JUDGES)/.ready: $(READY)
+	@$(UV) venv --quiet --clear --python $(RUN)/python $(JUDGES)
+	@$(UV) pip install --quiet --python $(JUDGES)/bin/python lerobot-doctor==0.2.0 robovet==0.2.2
+	@touch $@
 
 lint: $(READY) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .

@@ -13,6 +13,9 @@ from lerobot_excav.page.wishes import ResponseMessage, Wish
 MOST_WISHES = 100
 """Wishes that wait at most; more come only from a program (kind: guess)."""
 
+MOST_DELAYS = 100_000
+"""Delays that are kept: three hours of driving at ten pictures a second (kind: guess)."""
+
 
 @dataclass(kw_only=True)
 class DriversSeat:
@@ -22,12 +25,12 @@ class DriversSeat:
         sticks: Sticks of the page that drives.
         response: How they answer.
         clock: Tells the time [s].
-        delay_ms: From stick to picture, as that page measured it last [ms]; None before.
+        delays_ms: From stick to picture, as the driving pages measured it [ms], the last hours of it.
     """
 
     sticks: Sticks = field(default_factory=Sticks)
     response: StickResponse = field(default_factory=StickResponse)
-    delay_ms: float | None = None
+    delays_ms: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_DELAYS))
     clock: Callable[[], float] = time.monotonic
     _driver: int | None = None
     _generation: int = 0
@@ -79,6 +82,12 @@ class DriversSeat:
                 values = message.model_dump(exclude={"kind", "invert"})
                 self.response = StickResponse(invert=tuple(message.invert), **values)
 
+    def note_delay(self, page: int, delay_ms: float) -> None:
+        """Note what a page has measured from stick to picture [ms]; those of pages that look on are left out."""
+        with self._lock:
+            if self._driver == page:
+                self.delays_ms.append(delay_ms)
+
     def wish(self, page: int, wish: Wish) -> None:
         """Put a wish of a page down; those of pages that look on are left out."""
         with self._lock:
@@ -108,6 +117,6 @@ class DriversSeat:
             self.sticks.let_go()
 
     def _reset(self) -> None:
-        self.sticks, self.delay_ms = Sticks(heard_since_s=self.clock()), None
+        self.sticks = Sticks(heard_since_s=self.clock())
         self._generation += 1
         self._wishes.clear()

@@ -157,8 +157,8 @@ class PageServer:
                     self._seat.report(page, message.axes, message.number, lost=message.lost)
                 case SeenMessage():
                     drawn.note(message.number)
-                    if message.delay_ms is not None and self._seat.driver == page:
-                        self._seat.delay_ms = message.delay_ms
+                    if message.delay_ms is not None:
+                        self._seat.note_delay(page, message.delay_ms)
                 case TakeMessage():
                     self._seat.take(page, force=message.force)
                 case LeaveMessage():

@@ -48,7 +48,7 @@ class SeenMessage(_Message):
 
     kind: Literal["seen"]
     number: int
-    delay_ms: float | None = None  # from stick to picture, as the page measured it
+    delay_ms: Annotated[float, Field(ge=0.0)] | None = None  # from stick to picture, as the page measured it
 
 
 class ResponseMessage(_Message):

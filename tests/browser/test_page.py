@@ -77,7 +77,7 @@ def test_a_gamepad_drives_a_whole_cycle_as_the_operator_does(open_page):
         until(lambda: state_of(served)["over"] or state_of(served)["frame"] > 2 * len(plan), limit_s=180.0)
         assert state_of(served)["success"], state_of(served)["measured"]
         expect(page.locator("#measured")).to_contain_text("success")
-        assert served.console.seat.delay_ms > 0.0
+        assert min(served.console.seat.delays_ms) > 0.0
 
 
 def test_a_click_and_a_painted_region_are_commanded(open_page):

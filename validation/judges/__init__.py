@@ -1,0 +1,1 @@
+"""What two public judges of LeRobot datasets say about ours, and why we let some of it stand."""
