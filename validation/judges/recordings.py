@@ -10,7 +10,7 @@ from pathlib import Path
 from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
 EXCAV = (sys.executable, "-c", "import sys; from lerobot_excav.scripts.main import main; sys.exit(main(sys.argv[1:]))")
-EPISODES, SCENES, SECONDS = 4, 1, 4
+EPISODES, SCENES, SECONDS = 4, 1, 6
 
 
 def by_script(env_type: str, storage: str, out: Path) -> None:
@@ -45,7 +45,8 @@ def on_the_page(env_type: str, out: Path) -> None:
         fps = page.state["fps"]
 
         def sticks(frame: int) -> list[float]:
-            return [0.5 * math.sin(2.0 * math.pi * frame / fps / period_s) for period_s in (4.0, 5.0, 3.0, 6.0)]
+            # Out of the dead zone from the first moment on, for time stands still until somebody moves.
+            return [0.5 * math.sin(0.3 + 2.0 * math.pi * frame / fps / period_s) for period_s in (4.0, 5.0, 3.0, 6.0)]
 
         for _ in range(EPISODES):
             page.record(sticks, frames=SECONDS * fps)

@@ -1,3 +1,5 @@
-"""Commands, and the masks that show them in a picture; importing this makes the oracle known."""
+"""Commands, and the masks that show them in a picture; importing this makes the sources of this package known."""
 
-import lerobot_excav.envs.masks.oracle  # noqa: F401 - registers itself
+import lerobot_excav.envs.masks.geometry
+import lerobot_excav.envs.masks.manual
+import lerobot_excav.envs.masks.oracle  # noqa: F401 - they register themselves

@@ -1,18 +1,22 @@
 """Mask sources: what turns a command into pixels of the main picture, and the list of them.
 
 A source of one's own is a class with a `mask` method, made known by `register_mask_source`; then `--env.mask_source`,
-`--robot.mask_source` and `lerobot-excav demos --env.mask_source` take its name.
+`--robot.mask_source` and `lerobot-excav demos --env.mask_source` take its name. What it can be told stands in a file,
+`--env.mask_options`.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.options import MaskOptions, read_options
+from lerobot_excav.envs.masks.shot import Shot
 from lerobot_excav.envs.plugins import load_plugins
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 
@@ -35,6 +39,24 @@ class MaskView(Protocol):
 
     def depth_m(self) -> NDArray[np.float32]:
         """Return the distance along the optical axis, registered with the picture, (H, W) float32 [m]."""
+
+    def shot(self) -> Shot:
+        """Return the sharpest picture of main that there is, with its depth; its size is that of the camera."""
+
+    def command_key(self, command: Command) -> str:
+        """Return a name of the situation and the target that a file of masks can use, such as `val/3/0/1`."""
+
+    def place_w(self, command: Command) -> NDArray[np.float64] | None:
+        """Return where the commanded target is, (3,) [m], as whoever commands it knows; None if nobody does."""
+
+    def patch(self, place_w: NDArray[np.float64], shot: Shot) -> Pixels | None:
+        """Return the pixels of a shot that show the region of the ground around a place; None if targets are objects.
+
+        What the machine hides is not in it. It follows from depth alone, so a real machine has it too.
+        """
+
+    def words(self, command: Command) -> str:
+        """Return what people call the target."""
 
     def other_commands(self) -> list[Command]:
         """Return what else could be commanded now, in the order of the targets; there may be nothing."""
@@ -76,17 +98,29 @@ class MaskSource(Protocol):
         """Return the mask of a command, or None if nothing was found; an empty mask counts as nothing."""
 
 
-_SOURCES: dict[str, Callable[[], MaskSource]] = {}
+class _Registered(NamedTuple):
+    make: Callable[..., MaskSource]
+    options: type[MaskOptions] | None
 
 
-def register_mask_source(name: str, make: Callable[[], MaskSource]) -> None:
+_SOURCES: dict[str, _Registered] = {}
+
+
+def register_mask_source(
+    name: str, make: Callable[..., MaskSource], *, options: type[MaskOptions] | None = None
+) -> None:
     """Make a source known by its name in `mask_source` settings; making the same one known again changes nothing.
+
+    Args:
+        name: Its name.
+        make: Makes it: called with nothing, or with its options if it has any.
+        options: What it can be told.
 
     Raises:
         ConfigurationError: Another source has this name.
     """
-    known = _SOURCES.setdefault(name, make)
-    require(known is make, f"the mask source {name!r} exists; give the new one another name")
+    known = _SOURCES.setdefault(name, _Registered(make, options))
+    require(known == (make, options), f"the mask source {name!r} exists; give the new one another name")
 
 
 def mask_source_names() -> tuple[str, ...]:
@@ -95,14 +129,22 @@ def mask_source_names() -> tuple[str, ...]:
     return tuple(_SOURCES)
 
 
-def make_mask_source(name: str) -> MaskSource:
+def make_mask_source(name: str, *, options: str | None = None) -> MaskSource:
     """Make a source.
 
+    Args:
+        name: Its name.
+        options: TOML file of what it is told; None leaves everything as it is by default.
+
     Raises:
-        ConfigurationError: There is none of this name.
+        ConfigurationError: There is none of this name, or the file cannot be used.
     """
     require_choice("mask_source", name, mask_source_names())
-    return _SOURCES[name]()
+    make, kind = _SOURCES[name]
+    if kind is None:
+        require(options is None, f"mask_options={options} has no effect: the mask source {name!r} has no options")
+        return make()
+    return make(read_options(kind, name, None if options is None else Path(options)))
 
 
 class MaskMissingError(ConfigurationError):

@@ -11,6 +11,7 @@ from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.pointed import PointedSource
+from lerobot_excav.envs.masks.shot import ENLARGED, Shot
 from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask
 from lerobot_excav.envs.tasks.selection import Selection
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
@@ -41,6 +42,7 @@ class CommandedEnv(WatchedEnv):
     _frame: int
     _missing_frames: int
     _main_img: NDArray[np.uint8] | None
+    _shot_renderer: Renderer | None = None
 
     # What a task says of itself.
 
@@ -48,6 +50,10 @@ class CommandedEnv(WatchedEnv):
     @abstractmethod
     def renderer(self) -> Renderer:
         """Camera pictures of the world."""
+
+    @abstractmethod
+    def open_renderer(self, height: int, width: int) -> Renderer:
+        """Return a further renderer of the world, with pictures of another size [px]."""
 
     @abstractmethod
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
@@ -159,6 +165,36 @@ class CommandedEnv(WatchedEnv):
     def depth_m(self) -> NDArray[np.float32]:
         """Return the depth image registered with `main`, (H, W) float32 [m along the optical axis]."""
         return self.renderer.depth_m("main")
+
+    def shot(self) -> Shot:
+        """Return main and its depth, `ENLARGED` times sharper than policies see them."""
+        if self._shot_renderer is None:
+            height, width = self.settings.observation_size
+            self._shot_renderer = self.open_renderer(ENLARGED * height, ENLARGED * width)
+        eye = self._shot_renderer
+        return Shot(picture=eye.render("main"), depth_m=eye.depth_m("main"), camera=eye.camera("main"))
+
+    def command_key(self, command: Command) -> str:
+        """Return `SCENE_SET/SCENE/STAGE/TARGET`, by which files of masks name a situation."""
+        return f"{self.settings.scene_set}/{self.scene_id}/{self.stage}/{command.target_id}"
+
+    def place_w(self, command: Command) -> NDArray[np.float64] | None:
+        """Return where the target of a command is, (3,) [m], world frame; None if the task does not say it."""
+        return None
+
+    def patch(self, place_w: NDArray[np.float64], shot: Shot) -> Pixels | None:
+        """Return the pixels of a shot that show the ground around a place; None where targets are objects."""
+        return None
+
+    def words(self, command: Command) -> str:
+        """Return what people call the target of a command."""
+        return self.task_spec.description
+
+    def _close_shots(self) -> None:
+        """Free the graphics context of the shots."""
+        if self._shot_renderer is not None:
+            self._shot_renderer.close()
+            self._shot_renderer = None
 
     def other_commands(self) -> list[Command]:
         """Return what else could be commanded in this scene, in the order of the targets."""

@@ -81,7 +81,9 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
         )
         self._ticks_per_frame = TICKS_PER_SECOND // self.fps
-        self._source = self._named_source = self._corrupted(make_mask_source(self.settings.mask_source))
+        self._source = self._named_source = self._corrupted(
+            make_mask_source(self.settings.mask_source, options=self.settings.mask_options)
+        )
         self._world: World | None = None
         self._renderer: Picture | None = None
         self._selection: Selection | None = None
@@ -202,6 +204,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
     def close(self) -> None:
         """Free the graphics contexts."""
         self._close_views()
+        self._close_shots()
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = self._main_img = None

@@ -117,9 +117,14 @@ class TaskSettings:
         "Stream of scenes; they share none, and reports are made of test", default="train", choices=SCENE_SETS
     )
     mask_source: str = setting(
-        "What makes the target mask: oracle, which knows the scene, or a source of another package",
+        "What makes the target mask: oracle, which knows the scene; geometry, which looks at depth; manual, masks from "
+        "a file; or a source of another package",
         default="oracle",
         choices=mask_source_names,
+    )
+    mask_options: str | None = setting(
+        "TOML file of what the mask source is told, such as the masks of manual; left out: all as by default",
+        default=None,
     )
     mask_condition: str = setting("What the target mask shows", default="correct", choices=MASK_CONDITIONS)
     mask_noise: str = setting("Error that is added to the mask", default="none", choices=MASK_NOISES)
@@ -166,7 +171,11 @@ class TaskSettings:
         Raises:
             ConfigurationError: `obs_type` is `state`, and one is not its default.
         """
-        names = ("mask_source", "mask_condition", "mask_noise", "target_overlay") if obs_type == "state" else ()
+        names = (
+            ("mask_source", "mask_options", "mask_condition", "mask_noise", "target_overlay")
+            if obs_type == "state"
+            else ()
+        )
         for name in names:
             value, usual = getattr(self, name), getattr(TaskSettings, name)
             require(

@@ -132,6 +132,16 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
         require(float(away_m.min()) <= BLOCK_REACH_M, "there is no block at this place; point at one of the four")
         return int(away_m.argmin())
 
+    @override
+    def place_w(self, command: Command) -> NDArray[np.float64]:
+        """Return the middle of the commanded block, (3,) [m]."""
+        return np.asarray(self.workcell.block_pos_w[command.region])
+
+    @override
+    def words(self, command: Command) -> str:
+        """Return what people call the commanded block."""
+        return f"the {self._scene.colour_name(command.region)} block"
+
     def true_mask(self, command: Command) -> Pixels:
         """Return the pixels that show the block, (H, W) bool.
 

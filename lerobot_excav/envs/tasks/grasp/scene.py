@@ -20,14 +20,15 @@ HOME_SPREAD_RAD = 0.03
 """Standard deviation of the starting joint positions around the home pose [rad] (kind: guess)."""
 
 # Colours that stand out from table, tray and gripper (kind: guess).
-BLOCK_COLOURS = (
-    (0.85, 0.12, 0.12),
-    (0.12, 0.30, 0.85),
-    (0.10, 0.62, 0.22),
-    (0.95, 0.80, 0.10),
-    (0.95, 0.50, 0.08),
-    (0.55, 0.20, 0.70),
-)
+BLOCK_COLOUR_NAMES = {
+    "red": (0.85, 0.12, 0.12),
+    "blue": (0.12, 0.30, 0.85),
+    "green": (0.10, 0.62, 0.22),
+    "yellow": (0.95, 0.80, 0.10),
+    "orange": (0.95, 0.50, 0.08),
+    "purple": (0.55, 0.20, 0.70),
+}
+BLOCK_COLOURS = tuple(BLOCK_COLOUR_NAMES.values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,11 @@ class GraspScene(WorkcellStart):
 
     scene_set: str  # `train`, `val` or `test`; their random streams are disjoint
     scene_id: int  # number within the set
+
+    def colour_name(self, block: int) -> str:
+        """Return what people call the colour of a block."""
+        away = {name: float(np.abs(self.block_rgb[block] - rgb).max()) for name, rgb in BLOCK_COLOUR_NAMES.items()}
+        return min(away, key=lambda name: away[name])
 
 
 @lru_cache(maxsize=8)

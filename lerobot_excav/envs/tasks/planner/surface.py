@@ -24,6 +24,10 @@ STEP_M = 0.1
 """What rises over its surroundings by more than this slope and this step [m] is a part of the machine; sand rests at
 0.81, and a wall of cohesive soil loses its rim to this rule (kind: guess)."""
 
+SOIL_BAND_M = 0.12
+"""How far from the height of its cell a point of the soil lies at most [m]: half a cell's diagonal along the steepest
+slope, and a grain (kind: guess)."""
+
 _RISE_CELLS = 12  # over which the slope is followed: 1.2 m, more than a bucket is long
 
 
@@ -63,6 +67,12 @@ class SeenSurface:
         x, y = points_w[..., 0], points_w[..., 1]
         along_x = (self.x_w[0] - half <= x) & (x <= self.x_w[-1] + half)
         return np.asarray(along_x & (self.y_w[0] - half <= y) & (y <= self.y_w[-1] + half))
+
+    def shows(self, points_w: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points (..., 3) [m] are soil that is seen, and no part of the machine above it; NaN is not."""
+        cells = self.cells_at(points_w)
+        away_m = np.abs(points_w[..., 2] - self.heights_m[cells])
+        return np.asarray(self.covers(points_w) & self.is_seen[cells] & (away_m < SOIL_BAND_M))
 
 
 def see_surface(depth_m: NDArray[np.floating], camera: PinholeCamera) -> SeenSurface:

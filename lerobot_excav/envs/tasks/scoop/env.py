@@ -14,8 +14,10 @@ from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.machines.excavator.viewing import WorksiteView
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.shot import Shot
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.envs.tasks.planner.surface import see_surface
 from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
@@ -176,6 +178,27 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         soil = self.worksite.soil
         heights_m = soil.heights_m.copy()
         return Relief(x_w=soil.x_w, y_w=soil.y_w, height_m=heights_m, rgb=height_colours(heights_m))
+
+    @override
+    def place_w(self, command: Command) -> NDArray[np.float64]:
+        """Return the middle of the commanded region, (3,) [m]."""
+        region: Target = command.region
+        return region.center_w
+
+    @override
+    def patch(self, place_w: NDArray[np.float64], shot: Shot) -> Pixels:
+        """Return the pixels of a shot that show the soil of the region around a place; the machine is no soil."""
+        region = Target(center_w=place_w, yaw_rad=cylinder_from_world(place_w)[1])
+        points_w = shot.points_w()
+        assert shot.depth_m is not None  # or there were no points
+        assert shot.camera is not None
+        soil = see_surface(shot.depth_m, shot.camera)
+        return region.contains(points_w) & soil.shows(points_w)
+
+    @override
+    def words(self, command: Command) -> str:
+        """Return what people call what is dug in."""
+        return "the pile of sand"
 
     @override
     def places_w(self) -> NDArray[np.float64]:

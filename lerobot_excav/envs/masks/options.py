@@ -1,0 +1,41 @@
+"""What a mask source is told, from a file: `--env.mask_options=FILE`."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from lerobot_excav.errors import ConfigurationError
+
+
+class MaskOptions(BaseModel):
+    """Base of the options of a source; every one of them has a default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def read_options[Options: MaskOptions](kind: type[Options], name: str, path: Path | None) -> Options:
+    """Read the options of a source; of a file that is not given, all are as by default.
+
+    Raises:
+        ConfigurationError: The file cannot be read, names an option that does not exist, or gives it a wrong value.
+    """
+    try:
+        return kind(**({} if path is None else _read(path)))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        allowed = ", ".join(kind.model_fields)
+        raise ConfigurationError(
+            f"mask_options={path}: {place or 'the file'}: {first['msg']}; the mask source {name!r} takes {allowed}"
+        ) from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(f"mask_options={path} cannot be read ({error.strerror}); give a TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"mask_options={path} is no TOML file: {error}") from error
