@@ -30,6 +30,7 @@ class Recording:
     def __init__(self, settings: DemonstrationSettings, out: Path) -> None:
         if out.exists() or out.is_symlink():
             raise DatasetError(f"--out={out} exists; choose another folder, or remove it first")
+        settings.env.require_commanded_mask()
         out.parent.mkdir(parents=True, exist_ok=True)
         self.settings, self.out = settings, out
         self._partial = PartialRun(out, settings, resume=True)

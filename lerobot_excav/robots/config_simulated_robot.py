@@ -58,6 +58,7 @@ class SimulatedRobotConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's clas
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        cast(TaskSettings, self).require_commanded_mask()
         length = cast(TaskSettings, self).episode_length
         require(
             length is None,

@@ -18,7 +18,7 @@ FRAMES = 12
 METRICS = (
     *("simulation_version", "task", "scene_set", "scene_id", "stage", "target_id", "is_success", "frames"),
     *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "target_overlay", "shown_target_id"),
-    *("fps", "episode_length", "commands", "mask_missing", "mask_missing_frames"),
+    *("fps", "episode_length", "commands", "mask_missing", "mask_missing_frames", "mask_fallbacks"),
 )
 
 

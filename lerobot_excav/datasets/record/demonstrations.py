@@ -69,9 +69,11 @@ def record_demonstrations(
 
     Raises:
         DatasetError: `out` exists, an interrupted run is in the way, or no episode is worth keeping.
-        ConfigurationError: `workers` is negative, or a started run has other settings.
+        ConfigurationError: `workers` is negative, a started run has other settings, or the source of masks chooses
+            targets itself.
     """
     require_workers(workers)
+    settings.env.require_commanded_mask()
     start = time.monotonic()
     if out.exists() or out.is_symlink():  # a folder cannot take the place of a link that leads nowhere
         outcomes = _require_finished(out, settings, resume=resume)

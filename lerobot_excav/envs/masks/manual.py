@@ -71,8 +71,8 @@ class ManualSource:
     def __init__(self, options: ManualOptions) -> None:
         require(
             bool(options.mask),
-            "mask_source='manual' needs masks: give mask_options=FILE, a TOML file with tables [[mask]], each with key, "
-            "and polygon or click",
+            "mask_source='manual' needs masks: give mask_options=FILE, a TOML file of tables [[mask]], each with a key "
+            "and a polygon or a click",
         )
         keys = [entry.key for entry in options.mask]
         twice = sorted({key for key in keys if keys.count(key) > 1})

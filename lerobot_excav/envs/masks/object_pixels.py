@@ -33,10 +33,10 @@ def object_by_depth(shot: Shot, place_w: NDArray[np.float64]) -> NDArray[np.bool
     floor_m = np.percentile(points_w[around][:, 2], 10.0)
     stands = (away_m < REACH_M) & (points_w[..., 2] > floor_m + LEAST_HEIGHT_M)
     if not stands.any():
-        return stands
+        return np.zeros(shot.size, dtype=bool)
     pieces, _ = ndimage.label(stands, structure=np.ones((3, 3)))
     nearest = np.unravel_index(np.argmin(np.where(stands, away_m, np.inf)), stands.shape)
-    return np.asarray(pieces == pieces[nearest])
+    return np.asarray(pieces == pieces[nearest], dtype=bool)
 
 
 def object_by_colour(picture: NDArray[np.uint8], box: tuple[float, float, float, float]) -> NDArray[np.bool_]:

@@ -77,13 +77,16 @@ class TargetMask:
         pixels: What it marks, (H, W) bool.
         target_id: Target that it shows; None if it shows none.
         source: Name of the source.
-        parameters: What the source and its corruptions were set to.
+        parameters: What the source and its corruptions were set to, and what they found.
+        place_w: Where the source itself has chosen to act, (3,) [m], world frame, and the commanded target moves to;
+            None if it shows what is commanded.
     """
 
     pixels: Pixels
     target_id: int | None
     source: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    place_w: NDArray[np.float64] | None = None
 
     @property
     def img(self) -> NDArray[np.uint8]:
@@ -101,13 +104,14 @@ class MaskSource(Protocol):
 class _Registered(NamedTuple):
     make: Callable[..., MaskSource]
     options: type[MaskOptions] | None
+    chooses: bool
 
 
 _SOURCES: dict[str, _Registered] = {}
 
 
 def register_mask_source(
-    name: str, make: Callable[..., MaskSource], *, options: type[MaskOptions] | None = None
+    name: str, make: Callable[..., MaskSource], *, options: type[MaskOptions] | None = None, chooses: bool = False
 ) -> None:
     """Make a source known by its name in `mask_source` settings; making the same one known again changes nothing.
 
@@ -115,12 +119,13 @@ def register_mask_source(
         name: Its name.
         make: Makes it: called with nothing, or with its options if it has any.
         options: What it can be told.
+        chooses: Whether it chooses the target itself, rather than showing the one that is commanded.
 
     Raises:
         ConfigurationError: Another source has this name.
     """
-    known = _SOURCES.setdefault(name, _Registered(make, options))
-    require(known == (make, options), f"the mask source {name!r} exists; give the new one another name")
+    known = _SOURCES.setdefault(name, _Registered(make, options, chooses))
+    require(known == (make, options, chooses), f"the mask source {name!r} exists; give the new one another name")
 
 
 def mask_source_names() -> tuple[str, ...]:
@@ -140,11 +145,16 @@ def make_mask_source(name: str, *, options: str | None = None) -> MaskSource:
         ConfigurationError: There is none of this name, or the file cannot be used.
     """
     require_choice("mask_source", name, mask_source_names())
-    make, kind = _SOURCES[name]
+    make, kind, _ = _SOURCES[name]
     if kind is None:
         require(options is None, f"mask_options={options} has no effect: the mask source {name!r} has no options")
         return make()
     return make(read_options(kind, name, None if options is None else Path(options)))
+
+
+def chooses_target(name: str) -> bool:
+    """Tell whether a source chooses the target itself, so that a commanded one cannot be shown."""
+    return name in mask_source_names() and _SOURCES[name].chooses
 
 
 class MaskMissingError(ConfigurationError):

@@ -1,6 +1,7 @@
 """A command and its mask: what a machine is to act on, as a source of masks shows it in the main view."""
 
 from abc import abstractmethod
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.geometry import GeometrySource
 from lerobot_excav.envs.masks.pointed import PointedSource
 from lerobot_excav.envs.masks.shot import ENLARGED, Shot
-from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask
+from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask, chooses_target
 from lerobot_excav.envs.tasks.selection import Selection
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -41,6 +43,7 @@ class CommandedEnv(WatchedEnv):
     _source: MaskSource  # of the present command
     _frame: int
     _missing_frames: int
+    _mask_fallbacks: int  # how often a source that chooses has left the choice to the planner
     _main_img: NDArray[np.uint8] | None
     _shot_renderer: Renderer | None = None
 
@@ -90,6 +93,14 @@ class CommandedEnv(WatchedEnv):
             ConfigurationError: There is none, and none can be made.
         """
         raise ConfigurationError(f"{self.task_spec.id} cannot be pointed at a place; command one of its targets")
+
+    def _move_target(self, target_id: int, place_w: NDArray[np.float64]) -> None:
+        """Move a target to a place (3,) [m], where a mask source has chosen to act.
+
+        Raises:
+            ConfigurationError: Targets cannot be moved.
+        """
+        raise ConfigurationError(f"mask_source={self.settings.mask_source!r} chooses where to act; here targets stay")
 
     def places_w(self) -> NDArray[np.float64]:
         """Return the points (H, W, 3) [m] that the pixels of `main` show, world frame; NaN where there is none."""
@@ -218,7 +229,16 @@ class CommandedEnv(WatchedEnv):
         command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
         self._commands.append(command)
         self._source = source or self._named_source
-        self._mask = self._source.mask(self, command) if self._shows_pixels else None
+        self._mask = self._ask(command) if self._shows_pixels else None
+
+    def _ask(self, command: Command) -> TargetMask | None:
+        """Ask the source for the mask of the newest command; where it chooses itself, the command's target moves."""
+        mask = self._source.mask(self, command)
+        if mask is not None and mask.place_w is not None:
+            self._move_target(command.target_id, mask.place_w)
+            self._commands[-1] = replace(command, region=self._region(command.target_id))
+            self._mask_fallbacks += "fallback" in mask.parameters
+        return mask
 
     def _change_command(self) -> None:
         """Give the next command if it is time for one."""
@@ -237,7 +257,7 @@ class CommandedEnv(WatchedEnv):
             reward, patience = reward + gain, patience - 1
             self._missing_frames += 1
             self._main_img = None
-            self._mask = self._source.mask(self, self.command)
+            self._mask = self._ask(self.command)
         return reward, terminated
 
     def observe(self) -> dict[str, Any]:
@@ -260,7 +280,7 @@ class CommandedEnv(WatchedEnv):
         """
         self._require_running()
         require_integer("target_id", target_id, 0, self._target_count - 1)
-        return self._point(target_id, self._named_source)
+        return self._point(target_id, self._pointing_source)
 
     def point_at(self, x: float, y: float) -> Seen:
         """Command what the main picture shows at a place, from its upper left corner (0, 0) to its lower right (1, 1).
@@ -279,7 +299,7 @@ class CommandedEnv(WatchedEnv):
         require(
             bool(np.isfinite(place_w).all()), f"at x={x:.2f}, y={y:.2f} of the main picture there is nothing to act on"
         )
-        return self._point(self._target_at(place_w), self._named_source)
+        return self._point(self._target_at(place_w), self._pointing_source)
 
     def point_with(self, pixels: Pixels) -> Seen:
         """Command what a mask (H, W) of the main picture covers, by that mask.
@@ -316,6 +336,12 @@ class CommandedEnv(WatchedEnv):
         self._begin_command(target_id)
         self._source, self._mask = source, mask
         return self._observe(), self._info(is_over=False)
+
+    @property
+    def _pointing_source(self) -> MaskSource:
+        """What shows a target that a person commands: the source of the settings, unless that one chooses itself."""
+        chooses = chooses_target(self.settings.mask_source)
+        return self._corrupted(GeometrySource()) if chooses else self._named_source
 
     def _corrupted(self, source: MaskSource) -> MaskSource:
         """Return a source under the condition and with the noise of the settings."""

@@ -89,7 +89,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._selection: Selection | None = None
         self._commands: list[Command] = []
         self._mask: TargetMask | None = None
-        self._frame = self._missing_frames = 0
+        self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._main_img: NDArray[np.uint8] | None = None
 
     # What a task says of itself.
@@ -172,7 +172,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         selection = select_episode(seed, options or {}, rng=rng, task=self.task_spec, length=length)
         self._start(selection)
         self._selection = selection
-        self._frame = self._missing_frames = 0
+        self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._commands, self._main_img, self._is_over = [], None, False
         self._give_command(selection.target_id)
         self._wait_for_mask()
@@ -255,6 +255,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             "shown_target_id": NO_TARGET if shown is None else shown,
             "mask_missing": self.mask_missing,
             "mask_missing_frames": self._missing_frames,
+            "mask_fallbacks": self._mask_fallbacks,
             "is_success": self.is_success,
             "frames": self._frame,
             **self._measures(),

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
-from lerobot_excav.envs.masks.source import mask_source_names
+from lerobot_excav.envs.masks.source import chooses_target, mask_source_names
 from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, declared_settings, setting
 
@@ -149,6 +149,11 @@ class TaskSettings:
             "give a kind of noise and a size from 1 pixel on, or neither (none, 0)",
         )
         require(
+            self.mask_condition != "mismatched" or not chooses_target(self.mask_source),
+            f"{prefix}mask_condition='mismatched' has no meaning with {prefix}mask_source={self.mask_source!r}, which "
+            "chooses the target itself; take another condition",
+        )
+        require(
             self.mask_condition != "zero" or noise == "none",
             f"{prefix}mask_noise={noise!r} has no effect with {prefix}mask_condition='zero', which shows no "
             "mask; leave one of them out",
@@ -158,6 +163,18 @@ class TaskSettings:
     def observation_size(self) -> tuple[int, int]:
         """Height and width of every picture [px]."""
         return self.observation_height, self.observation_width
+
+    def require_commanded_mask(self) -> None:
+        """Refuse a source that chooses the target itself, where recorded targets have to be those of the scene.
+
+        Raises:
+            ConfigurationError: It does.
+        """
+        require(
+            not chooses_target(self.mask_source),
+            f"{self.PREFIX}mask_source={self.mask_source!r} chooses where to act by itself, so no recording could be "
+            "paired or replayed; use it in lerobot-eval and lerobot-excav console",
+        )
 
     @property
     def mask_words(self) -> str:

@@ -12,7 +12,7 @@ from lerobot_excav.envs.masks.source import MaskSource
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
 from lerobot_excav.envs.tasks.commanded import Seen
-from lerobot_excav.envs.tasks.planner.candidates import rate
+from lerobot_excav.envs.tasks.planner.candidates import Candidates, rate
 from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets, proposal_of
 from lerobot_excav.envs.tasks.planner.score_overlay import with_scores
 from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
@@ -111,7 +111,7 @@ class ClearEnv(ExcavatorEnv):
             )
         eye = self._planner_renderer
         self.surface = see_surface(eye.depth_m("main"), eye.camera("main"))
-        self.plan = plan_targets(self.surface, self._excavator_settings.zones, self._clearing.vain_w)
+        self.plan = self.planned(self.surface)
 
     def _begin_cycle(self, target_id: int) -> None:
         count = len(self.plan.proposals)
@@ -149,11 +149,30 @@ class ClearEnv(ExcavatorEnv):
     @override
     def _target_at(self, place_w: NDArray[np.float64]) -> int:
         """Let the planner rate a place that somebody else proposes, beside its own proposals."""
-        rated = rate(place_w[None], self.surface, self._excavator_settings.zones, self._clearing.vain_w)
+        rated = self.rated(place_w[None], self.surface)
         require(not rated.is_barred[0], f"keep_out={self._excavator_settings.keep_out!r} bars this place")
         target_id = super()._target_at(place_w)
         self.plan = replace(self.plan, proposals=(*self.plan.proposals, proposal_of(rated, 0)))
         return target_id
+
+    @override
+    def _move_target(self, target_id: int, place_w: NDArray[np.float64]) -> None:
+        """Let the planner rate a place that a mask source has chosen, in the stead of one of its proposals."""
+        chosen = proposal_of(self.rated(place_w[None], self.surface), 0)
+        proposals = [chosen if number == target_id else old for number, old in enumerate(self.plan.proposals)]
+        self.plan = replace(self.plan, proposals=tuple(proposals))
+        super()._move_target(target_id, place_w)
+        self._clearing.recommand(target_id, chosen)
+
+    @override
+    def planned(self, surface: SeenSurface) -> Plan:
+        """Return what the planner proposes for a surface; it knows where cycles brought nothing."""
+        return plan_targets(surface, self._excavator_settings.zones, self._clearing.vain_w)
+
+    @override
+    def rated(self, places_w: NDArray[np.float64], surface: SeenSurface) -> Candidates:
+        """Return how the planner rates places (n, 3) [m]."""
+        return rate(places_w, surface, self._excavator_settings.zones, self._clearing.vain_w)
 
     @override
     def _point(self, target_id: int, source: MaskSource) -> Seen:

@@ -17,7 +17,9 @@ from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.shot import Shot
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
-from lerobot_excav.envs.tasks.planner.surface import see_surface
+from lerobot_excav.envs.tasks.planner.candidates import Candidates, rate
+from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
 from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
@@ -216,6 +218,22 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         region = Target(center_w=place_w.copy(), yaw_rad=cylinder_from_world(place_w)[1])
         self.cycle.scene = replace(self.scene, targets=(*self.scene.targets, region))
         return len(self.scene.targets) - 1
+
+    @override
+    def _move_target(self, target_id: int, place_w: NDArray[np.float64]) -> None:
+        """Make a region around a place the target of this number."""
+        region = Target(center_w=place_w.copy(), yaw_rad=cylinder_from_world(place_w)[1])
+        targets = [region if number == target_id else old for number, old in enumerate(self.scene.targets)]
+        self.cycle.scene = replace(self.scene, targets=tuple(targets))
+        self.cycle.retarget(target_id)
+
+    def planned(self, surface: SeenSurface) -> Plan:
+        """Return what the planner of pile clearing proposes for a surface."""
+        return plan_targets(surface, self._excavator_settings.zones)
+
+    def rated(self, places_w: NDArray[np.float64], surface: SeenSurface) -> Candidates:
+        """Return how that planner rates places (n, 3) [m]."""
+        return rate(places_w, surface, self._excavator_settings.zones)
 
     def true_mask(self, command: Command) -> Pixels:
         """Return the pixels whose soil surface point lies in the patch, (H, W) bool."""

@@ -1,0 +1,73 @@
+"""Weights of the models that make masks: from a folder, or by name from the Hugging Face Hub; offline by default."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict
+
+from lerobot_excav.errors import ConfigurationError
+
+
+class ModelName(BaseModel):
+    """Which weights to take.
+
+    Attributes:
+        name: Folder of the weights, or their name on the Hub.
+        revision: Commit of the Hub, so that a result can be repeated; a folder has none.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    revision: str | None = None
+
+    @property
+    def words(self) -> str:
+        """How provenance names them: a folder by its last part, for its place is nobody's business."""
+        return Path(self.name).name if Path(self.name).is_dir() else f"{self.name}@{self.revision or 'main'}"
+
+
+class Placement(NamedTuple):
+    """Where a model runs, and whether its weights may be fetched from the Hub."""
+
+    download: bool
+    device: str
+
+
+def load(kind: Callable[..., Any], model: ModelName, *, download: bool, **options: Any) -> Any:
+    """Load a model or its processor, `kind` being its class's `from_pretrained`.
+
+    Args:
+        kind: Loads it.
+        model: Which.
+        download: Whether it may be fetched from the Hub.
+        options: Further arguments of `kind`.
+
+    Raises:
+        ConfigurationError: The weights are not here and may not be fetched, or are damaged.
+    """
+    revision = {} if Path(model.name).is_dir() else {"revision": model.revision}
+    try:
+        return kind(model.name, local_files_only=not download, **revision, **options)
+    except (OSError, ValueError, RuntimeError, KeyError) as error:
+        where = os.environ.get("HF_HOME", "~/.cache/huggingface")
+        raise ConfigurationError(
+            f"the weights {model.name!r} cannot be loaded: {' '.join(str(error).split())[:300]}. Give a folder that "
+            f"holds them, or set download = true in mask_options; what was fetched before lies in {where}"
+        ) from error
+
+
+def require_transformers() -> None:
+    """Check that the library of the models is there.
+
+    Raises:
+        ConfigurationError: It is not.
+    """
+    try:
+        import transformers  # noqa: F401
+    except ImportError as missing:
+        raise ConfigurationError(
+            "masks from words need the library transformers; install it with: pip install 'lerobot_env_excav[masks]'"
+        ) from missing
