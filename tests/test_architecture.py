@@ -28,7 +28,7 @@ LAYERS = [
     ["policies"],
 ]
 SHARED = {"errors", "run_lock", "setting", "whole_file"}
-DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card"]
+DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks"]
 FREE = {"plugin", "scripts.export"}
 
 

@@ -203,7 +203,8 @@ TASK = {
     "episode_length": optional(whole(1, ENDLESS)),
     **dict.fromkeys(("observation_height", "observation_width"), whole(32, 1024)),
     "scene_set": one_of("train", "val", "test"),
-    "mask_source": one_of("oracle"),
+    "mask_source": one_of("oracle", "geometry", "manual", "grounded_sam"),
+    "mask_options": optional(text),
     "mask_condition": one_of("correct", "zero", "random", "mismatched"),
     "mask_noise": one_of("shift", "erode", "dilate").beside(mask_noise_px=3),  # none has no size
     "mask_noise_px": whole(1, 1024).beside(mask_noise="shift"),
@@ -308,6 +309,11 @@ COMMAND_TABLES = {
     "bench": {
         **{**SCENES, **WORK, "json": optional(path)},
         "only": optional(one_of("environment", "writing", "demos")),
+    },
+    "masks": {
+        **dict.fromkeys(("dataset", "out"), optional(path)),
+        "source": optional(one_of("oracle", "geometry", "manual", "grounded_sam", "vlm_dig")),
+        "main_camera": optional(text),
     },
     "card": {
         "dataset": optional(path),

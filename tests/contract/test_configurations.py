@@ -36,9 +36,9 @@ from .field_rules import (
 def test_every_field_is_in_the_table(name):
     kind, table, _ = CONFIGURATIONS[name]
     known = {field.name for field in dataclasses.fields(kind)}
-    assert known - {"env", *DERIVED, *LEROBOTS_OWN} - ({"env"} if name != "lerobot-excav export" else set()) <= set(
-        table
-    )
+    assert known - {"env", "mask", *DERIVED, *LEROBOTS_OWN} - (
+        {"env"} if name != "lerobot-excav export" else set()
+    ) <= set(table)
     assert set(table) <= known
 
 

@@ -134,12 +134,13 @@ def mask_source_names() -> tuple[str, ...]:
     return tuple(_SOURCES)
 
 
-def make_mask_source(name: str, *, options: str | None = None) -> MaskSource:
+def make_mask_source(name: str, *, options: str | None = None, text: str | None = None) -> MaskSource:
     """Make a source.
 
     Args:
         name: Its name.
         options: TOML file of what it is told; None leaves everything as it is by default.
+        text: What to look for, before what the options say.
 
     Raises:
         ConfigurationError: There is none of this name, or the file cannot be used.
@@ -148,8 +149,13 @@ def make_mask_source(name: str, *, options: str | None = None) -> MaskSource:
     make, kind, _ = _SOURCES[name]
     if kind is None:
         require(options is None, f"mask_options={options} has no effect: the mask source {name!r} has no options")
+        require(text is None, f"the text {text!r} has no effect: the mask source {name!r} does not read")
         return make()
-    return make(read_options(kind, name, None if options is None else Path(options)))
+    told = read_options(kind, name, None if options is None else Path(options))
+    if text is not None:
+        require("text" in kind.model_fields, f"the text {text!r} has no effect: the mask source {name!r} does not read")
+        told = told.model_copy(update={"text": text})
+    return make(told)
 
 
 def chooses_target(name: str) -> bool:

@@ -1,0 +1,102 @@
+"""Making the masks of a whole dataset."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from lerobot_excav.datasets.complete.exchange import require_free, workspace
+from lerobot_excav.datasets.format.dataset_info import DatasetInfo, read_info
+from lerobot_excav.datasets.format.episode_table import iterate_episodes
+from lerobot_excav.datasets.format.schema import PAIR_KEY, camera_key
+from lerobot_excav.datasets.masks import recorded_pictures, simulated_starts
+from lerobot_excav.datasets.masks.found_masks import FoundMask, FoundMasks
+from lerobot_excav.datasets.masks.mask_column import write_with_masks
+from lerobot_excav.datasets.pairs.paired_index import write_index
+from lerobot_excav.envs.masks.source import MaskSource, chooses_target, make_mask_source
+from lerobot_excav.errors import require
+
+Episode = tuple[int, Callable[[], list[FoundMask]]]
+"""The number of an episode, and what finds its masks."""
+
+
+def make_masks(
+    root: Path,
+    out: Path,
+    *,
+    source: str,
+    options: str | None = None,
+    text: str | None = None,
+    main_camera: str | None = None,
+    show_progress: bool = False,
+) -> int:
+    """Write a copy of a dataset with the masks of a source; the same call goes on after an interruption.
+
+    Args:
+        root: The dataset: demonstrations of this package, whose starts the simulator shows again, or any other one.
+        out: The copy.
+        source: Name of the source.
+        options: TOML file of what it is told.
+        text: What to look for, before what the options and the task say.
+        main_camera: Camera of a dataset of somebody else, as in its features.
+        show_progress: Whether to draw a bar.
+
+    Returns:
+        Number of episodes.
+
+    Raises:
+        DatasetError: A dataset cannot be read, `out` exists, or the source finds nothing in an episode.
+        ConfigurationError: There is no such source, or it cannot be used here.
+    """
+    require_free(out)
+    require(
+        not chooses_target(source),
+        f"--source={source} chooses where to act by itself, and recorded actions lead elsewhere; take another source",
+    )
+    made = make_mask_source(source, options=options, text=text)
+    info = read_info(root)
+    is_ours = PAIR_KEY in info.features
+    require(
+        not (is_ours and main_camera),
+        f"--main_camera={main_camera} has no effect: these demonstrations have a camera that is called main",
+    )
+    settings = {"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera}
+    episodes = (
+        _of_ours(root, info, made) if is_ours else _of_others(root, info, made, main_camera or camera_key("main"))
+    )
+    with FoundMasks(out, settings) as found:
+        bar = tqdm(total=info.total_episodes, desc="masks", unit="episode", disable=not show_progress)
+        for index, find in episodes:
+            if index not in found.episodes:
+                found.add(index, find())
+            bar.update()
+        bar.close()
+        with workspace(beside=out) as folder:
+            write_with_masks(root, folder / "dataset", found.episodes, _provenance(settings))
+            if is_ours:
+                write_index(folder / "dataset")
+            (folder / "dataset").rename(out)
+        found.clear()
+    return info.total_episodes
+
+
+def _of_ours(root: Path, info: DatasetInfo, source: MaskSource) -> Iterator[Episode]:
+    size = info.size_of(camera_key("main"))
+    for recorded in iterate_episodes(root, simulated_starts.needed_keys(info.spec)):
+        yield (
+            recorded.index,
+            lambda recorded=recorded: simulated_starts.find_masks(recorded, source, fps=info.fps, size=size),
+        )
+
+
+def _of_others(root: Path, info: DatasetInfo, source: MaskSource, camera: str) -> Iterator[Episode]:
+    view = recorded_pictures.first_pictures(root, camera)
+    for index in range(info.total_episodes):
+        yield index, lambda index=index: recorded_pictures.find_masks(view(index), source, index)
+
+
+def _provenance(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what is noted of the masks: a folder's place is nobody's business."""
+    options = settings["options"]
+    return {**settings, "options": None if options is None else Path(options).name}
