@@ -1,7 +1,9 @@
 """The workflows plan their stages, and their commands are ones that the programs would accept."""
 
 import ast
+import json
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -87,9 +89,50 @@ def test_every_stage_is_planned(plan):
 
 
 def test_every_stage_of_the_excavator_is_planned(dig_plan):
-    stages = {"data": 3, "slim": 3, "train": 15, "checkpoint": 15, "play": 30, "operator": 2}
-    stages |= {"audit": 1, "report": 1, "all": 1}
+    stages = {"data_shard": 3, "data": 3, "slim": 3, "train": 15, "checkpoint": 15, "operator": 2}
+    stages |= {"play_shard": 30, "play": 30, "audit": 1, "report": 1, "all": 1}
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
+
+
+def played(plan, command, first, number):
+    """Return the scenes of every recording or evaluation, by what it is of."""
+    scenes = {}
+    for words in commands(plan):
+        if words[: len(command)] == command:
+            options = dict(word.lstrip("-").split("=", 1) for word in words[len(command) :])
+            kind = tuple(options.get(name) for name in ("targets", "target_rule", "policy.path", "env.task"))
+            start = int(options[first])
+            scenes.setdefault(kind, []).extend(range(start, start + int(options[number])))
+    return {kind: sorted(numbers) for kind, numbers in scenes.items()}
+
+
+def test_shards_play_the_scenes_of_one_piece(dig_plan, tmp_path):
+    sharded = dry_run(
+        EXCAVATOR, tmp_path, "out=elsewhere", "results=page", "steps=2000", "data_shards=7", "play_shards=4"
+    )
+    assert (counts(sharded)["data_shard"], counts(sharded)["play_shard"]) == (21, 120)
+    for ways in ((["lerobot-excav", "demos"], "first_scene", "scenes"), (["lerobot-eval"], "seed", "eval.n_episodes")):
+        assert played(sharded, *ways) == played(dig_plan, *ways)
+    assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
+
+
+def test_metrics_of_shards_are_put_together_in_their_order(tmp_path):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    for name, line in (("a", '{"scene_id": 0}\n'), ("b", '{"scene_id": 1}\n')):
+        (tmp_path / f"{name}.jsonl").write_text(line)
+        origin = {"command": f"play {name}", "commit": "c", "modified": name == "b", "seconds": 2.0}
+        (tmp_path / f"{name}.json").write_text(json.dumps(origin))
+    shards["merge_metrics"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"], tmp_path / "whole.jsonl")
+    assert (tmp_path / "whole.jsonl").read_text() == '{"scene_id": 0}\n{"scene_id": 1}\n'
+    merged = json.loads((tmp_path / "whole.json").read_text())
+    assert merged == {"command": "play a && play b", "commit": "c", "modified": True, "seconds": 4.0}
+
+
+@pytest.mark.parametrize(("count", "shards"), [(30, 7), (1, 1), (3, 5), (120, 30)])
+def test_ranges_cover_all_scenes_once_and_are_nearly_equal(count, shards):
+    ranges = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["ranges"](count, shards)
+    assert [scene for first, number in ranges for scene in range(first, first + number)] == list(range(count))
+    assert max(number for _, number in ranges) - min(number for _, number in ranges) <= 1
 
 
 def test_what_has_landed_is_not_planned_again(tmp_path):
@@ -118,7 +161,7 @@ def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
 
 
 def test_the_slim_copy_leaves_out_every_column_that_no_policy_reads(dig_plan):
-    slim = next(words for words in commands(dig_plan) if words[0] == "lerobot-edit-dataset")
+    slim = next(words for words in commands(dig_plan) if "--operation.type=remove_feature" in words)
     (names,) = (word.partition("=")[2] for word in slim if word.startswith("--operation.feature_names="))
     assert sorted(ast.literal_eval(names)) == sorted(excav_features(SCOOP))
 
@@ -155,7 +198,7 @@ def test_the_page_shows_what_the_stages_make(plan):
 
 def test_the_page_of_the_excavator_shows_what_the_stages_make(dig_plan):
     contents = read_contents(EXCAVATOR.with_name("rows.toml"), metrics=Path("page/metrics"))
-    made = {Path(path).stem for path in re.findall(r"output: (\S+\.jsonl)", dig_plan)}
+    made = {Path(path).stem for path in re.findall(r"output: (page/metrics/\S+\.jsonl)", dig_plan)}
     assert made == {name for row in contents.rows for name in row.names}
 
 

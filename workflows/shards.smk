@@ -1,0 +1,27 @@
+"""Shards: ranges of scenes that are recorded or played apart, on as many machines as there are."""
+
+import json
+from pathlib import Path
+
+
+def ranges(count, shards):
+    """Divide `count` scenes into at most `shards` ranges of nearly equal length: pairs of first and number."""
+    edges = [round(count * i / shards) for i in range(shards + 1)]
+    return [(first, end - first) for first, end in zip(edges, edges[1:]) if end > first]
+
+
+def merge_metrics(parts, whole):
+    """Put metrics files together in their order, and say where the whole comes from.
+
+    Episodes are the same as in one run. Commands, seconds and all else that differs are those of the parts.
+    """
+    whole = Path(whole)
+    whole.write_text("".join(Path(part).read_text(encoding="utf-8") for part in parts), encoding="utf-8")
+    origins = [json.loads(Path(part).with_suffix(".json").read_text(encoding="utf-8")) for part in parts]
+    merged = {
+        **origins[0],
+        "command": " && ".join(origin["command"] for origin in origins),
+        "seconds": sum(origin["seconds"] or 0.0 for origin in origins),
+        "modified": any(origin["modified"] for origin in origins),
+    }
+    whole.with_suffix(".json").write_text(json.dumps(merged, indent=1) + "\n", encoding="utf-8")
