@@ -48,7 +48,7 @@ class RerunLog:
         rerun.log(TARGET, rerun.Image(main), static=True)
         for name, value in zip(self._env.task_spec.task_state_names, self._env.task_state, strict=True):
             rerun.log(f"{TASK_STATE}/{name}", rerun.Scalars(float(value)))
-        if self._count % round(GROUND_EVERY_S * self._env.fps) == 0:
+        if self._count % max(1, round(GROUND_EVERY_S * self._env.fps)) == 0:
             self._show_ground(rerun)
         if self._count == 1:  # LeRobot has sent its own layout, without any of this, after the first frame
             rerun.send_blueprint(self._layout(observation))

@@ -1,10 +1,11 @@
 """Command lines made of dataclasses, in LeRobot's own words, by the parser that LeRobot uses."""
 
 import argparse
+import dataclasses
 import itertools
 import json
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, override
@@ -154,7 +155,7 @@ def _with_texts_quoted(kind: type[Arguments], options: Sequence[str]) -> list[st
     words = list(options)
     for number, word in enumerate(options):
         name, equals, text = word.partition("=")
-        taken_as = types.get(name.removeprefix("--"))
+        taken_as = _type_of(types, name.removeprefix("--").split("."))
         if not {str, Path} & {taken_as, *typing.get_args(taken_as)} or typing.get_origin(taken_as) is list:
             continue
         if equals:
@@ -162,6 +163,15 @@ def _with_texts_quoted(kind: type[Arguments], options: Sequence[str]) -> list[st
         elif not "".join(options[number + 1 : number + 2]).startswith("--"):
             words[number + 1 : number + 2] = map(_quoted, options[number + 1 : number + 2])
     return words
+
+
+def _type_of(types: Mapping[str, Any], path: Sequence[str]) -> Any:
+    """Return the type of an option, which may be one of a part: `mask.text`; None if it is not known here."""
+    first, *rest = path
+    kind = types.get(first)
+    if not rest:
+        return kind
+    return _type_of(typing.get_type_hints(kind), rest) if dataclasses.is_dataclass(kind) else None
 
 
 def _quoted(text: str) -> str:

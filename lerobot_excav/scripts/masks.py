@@ -1,9 +1,9 @@
 """Give a dataset masks of another source, or a dataset that has none its first ones.
 
-The result is a new dataset with the column observation.images.target_mask; everything else is copied as it is, and
-meta/excav_masks.json tells how every mask came about. Demonstrations of this package are shown again by the simulator,
-so that sources which need depth work; of anybody else's dataset the source sees the first picture of every episode. The
-same command goes on after an interruption.
+The result is a new dataset with the column observation.images.target_mask; all other values and videos stay as they
+are, and meta/excav_masks.json tells how every mask came about. Demonstrations of this package are shown again by the
+simulator, so that sources which need depth work; of anybody else's dataset the source sees the first picture of every
+episode. The same command goes on after an interruption.
 
 Examples:
   lerobot-excav masks outputs/paired --source=geometry --out=outputs/by_depth

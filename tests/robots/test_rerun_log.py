@@ -71,6 +71,7 @@ def test_the_ground_is_logged_as_the_soil_lies(excavator, monkeypatch):
 
 
 def test_without_a_recording_nothing_is_drawn(excavator, monkeypatch):
+    monkeypatch.setattr(rerun, "get_global_data_recording", lambda: None)
     monkeypatch.setattr(rerun, "log", lambda *_, **__: pytest.fail("logged"))
     excavator.get_observation()
 

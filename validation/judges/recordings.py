@@ -1,6 +1,7 @@
 """Small datasets, one of every way to record: by script, by gamepad, on the page; of both machines."""
 
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -22,6 +23,8 @@ def by_script(env_type: str, storage: str, out: Path) -> None:
 def by_gamepad(out: Path) -> None:
     """Record the excavator with `lerobot-record` and a simulated gamepad, and complete it."""
     log, raw = out.with_suffix(".session.jsonl"), out.with_suffix(".raw")
+    shutil.rmtree(raw, ignore_errors=True)  # of a run that was interrupted
+    log.unlink(missing_ok=True)
     record = (
         *("--robot.type=excavator_sim", f"--robot.session_log={log}", "--teleop.type=excavator_joystick"),
         *(

@@ -22,6 +22,7 @@ from typing import Any
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.statistics import wilson_interval
+from lerobot_excav.whole_file import write_whole
 from validation.page_operator.pad import STUBBED_PAD, Plan, planned
 from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
@@ -106,7 +107,10 @@ def _play_all(missing: list[tuple[int, int]], path: Path) -> None:
 
 def read_cycles(path: Path) -> list[dict[str, Any]]:
     """Return the finished cycles of the present simulation, of a file that may not exist yet."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    if lines and not lines[-1].endswith("\n"):  # an interruption cut it short: that cycle is played again
+        write_whole(path, "".join(lines[:-1]))
+        lines.pop()
     cycles = [json.loads(line) for line in lines]
     return [cycle for cycle in cycles if cycle["simulation_version"] == SCOOP.simulation_version]
 

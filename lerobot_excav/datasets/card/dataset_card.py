@@ -104,6 +104,12 @@ def write_card(
     return card
 
 
+def is_own_card(root: Path) -> bool:
+    """Tell whether a dataset has a README that was written here."""
+    path = root / CARD_PATH
+    return path.is_file() and MARK in path.read_text(encoding="utf-8", errors="replace")
+
+
 def require_own_card(root: Path) -> None:
     """Check that no README of somebody else would be lost.
 
@@ -111,7 +117,7 @@ def require_own_card(root: Path) -> None:
         DatasetError: There is one.
     """
     path = root / CARD_PATH
-    if path.exists() and MARK not in path.read_text(encoding="utf-8", errors="replace"):
+    if path.exists() and not is_own_card(root):
         raise DatasetError(f"{path} was not written by lerobot-excav card; move it away, or it would be replaced")
 
 

@@ -24,8 +24,9 @@ def _this_format(version: str) -> str:
 
 
 def _with_size(feature: Feature) -> Feature:
-    if feature["dtype"] in PICTURE_DTYPES and (len(feature["shape"]) != 3 or feature["shape"][2] != 3):
-        raise ValueError(f"shape={feature['shape']} is not that of a picture; allowed is [height, width, 3]")
+    shape = feature["shape"]
+    if feature["dtype"] in PICTURE_DTYPES and (len(shape) != 3 or not {1, 3} & {shape[0], shape[2]}):
+        raise ValueError(f"shape={shape} is not that of a picture; allowed is [height, width, 3], or 1 of depth")
     return feature
 
 
@@ -79,8 +80,8 @@ class DatasetInfo(BaseModel):
 
     def size_of(self, key: str) -> tuple[int, int]:
         """Return height and width of a camera's pictures [px]."""
-        height, width, _ = self.features[key]["shape"]
-        return height, width
+        height, width, channels = self.features[key]["shape"]
+        return (height, width) if channels in (1, 3) else (width, channels)  # channels may stand first
 
     def data_file(self, root: Path, chunk: int, file: int) -> Path:
         """Return the path of a file of frames.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.run_lock import RunLock
 from lerobot_excav.whole_file import write_whole
@@ -95,11 +96,11 @@ class FoundMasks:
         if not self._path.exists():
             write_whole(self._path, json.dumps(settings) + "\n")
             return {}
-        first, *lines = self._path.read_text(encoding="utf-8").splitlines(keepends=True)
         try:
+            first, *lines = self._path.read_text(encoding="utf-8").splitlines(keepends=True)
             begun = json.loads(first)
-        except json.JSONDecodeError:
-            begun = None
+        except ValueError:  # empty, no text, or no JSON
+            begun, lines = None, []
         whole = [line for line in lines if line.endswith("\n")]  # an interruption may have cut the last one short
         is_empty = isinstance(begun, dict) and set(begun) == set(settings) and not whole
         if begun != settings and not is_empty:
@@ -107,5 +108,6 @@ class FoundMasks:
                 f"{self._path} was not begun by this command with these options; remove it, or choose another --out"
             )
         write_whole(self._path, "".join([json.dumps(settings) + "\n", *whole]))
-        found = map(json.loads, whole)
-        return {each["episode_index"]: [FoundMask.from_record(mask) for mask in each["masks"]] for each in found}
+        with reading(self._path):
+            found = map(json.loads, whole)
+            return {each["episode_index"]: [FoundMask.from_record(mask) for mask in each["masks"]] for each in found}

@@ -1,15 +1,18 @@
 """Making the masks of a whole dataset."""
 
-from collections.abc import Callable, Iterator
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from lerobot_excav.datasets.complete.exchange import require_free, workspace
-from lerobot_excav.datasets.format.dataset_info import DatasetInfo, read_info
+from lerobot_excav.datasets.format.dataset_info import INFO_PATH, DatasetInfo, read_info
 from lerobot_excav.datasets.format.episode_table import iterate_episodes
-from lerobot_excav.datasets.format.schema import PAIR_KEY, camera_key
+from lerobot_excav.datasets.format.schema import PAIR_KEY, SIMULATION_KEY, camera_key
+from lerobot_excav.datasets.format.version_check import require_this_simulation
 from lerobot_excav.datasets.masks import recorded_pictures, simulated_starts
 from lerobot_excav.datasets.masks.found_masks import FoundMask, FoundMasks
 from lerobot_excav.datasets.masks.mask_column import write_with_masks
@@ -51,6 +54,9 @@ def make_masks(
     """
     require_free(out)
     require(
+        root.resolve() not in out.resolve().parents, f"--out={out} lies within {root}; choose a folder outside of it"
+    )
+    require(
         not chooses_target(source),
         f"--source={source} chooses where to act by itself, and recorded actions lead elsewhere; take another source",
     )
@@ -61,7 +67,15 @@ def make_masks(
         not (is_ours and main_camera),
         f"--main_camera={main_camera} has no effect: these demonstrations have a camera that is called main",
     )
-    settings = {"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera}
+    require(
+        not (is_ours and text is not None),
+        f"--mask.text={text!r} would name the same thing for all targets; leave it out: each has its name here",
+    )
+    settings = {
+        **{"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera},
+        "told": None if options is None else _digest([Path(options)]),
+        "episodes": _digest([root / INFO_PATH, *sorted(root.glob("meta/episodes/*/*.parquet"))]),
+    }
     episodes = (
         _of_ours(root, info, made) if is_ours else _of_others(root, info, made, main_camera or camera_key("main"))
     )
@@ -83,17 +97,30 @@ def make_masks(
 
 def _of_ours(root: Path, info: DatasetInfo, source: MaskSource) -> Iterator[Episode]:
     size = info.size_of(camera_key("main"))
+    versions = {e.index: e.simulation_version for e in iterate_episodes(root, [SIMULATION_KEY])}
+    require_this_simulation(info.spec, versions, source=root, instead="")
     for recorded in iterate_episodes(root, simulated_starts.needed_keys(info.spec)):
-        yield (
-            recorded.index,
-            lambda recorded=recorded: simulated_starts.find_masks(recorded, source, fps=info.fps, size=size),
-        )
+        yield recorded.index, partial(simulated_starts.find_masks, recorded, source, fps=info.fps, size=size)
 
 
 def _of_others(root: Path, info: DatasetInfo, source: MaskSource, camera: str) -> Iterator[Episode]:
     view = recorded_pictures.first_pictures(root, camera)
     for index in range(info.total_episodes):
-        yield index, lambda index=index: recorded_pictures.find_masks(view(index), source, index)
+        yield index, partial(_of_picture, view, index, source)
+
+
+def _of_picture(
+    view: Callable[[int], recorded_pictures.RecordedPicture], index: int, source: MaskSource
+) -> list[FoundMask]:
+    return recorded_pictures.find_masks(view(index), source, index)
+
+
+def _digest(paths: Sequence[Path]) -> str:
+    """Return a digest of files, so that a run goes on only with the same ones."""
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _provenance(settings: dict[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A copy of a dataset whose mask column holds other masks; everything else stays byte for byte."""
+"""A copy of a dataset whose mask column holds other masks; all other values and videos stay as they are."""
 
 import json
 import shutil
@@ -11,7 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from lerobot.datasets.compute_stats import aggregate_stats, get_feature_stats
 from lerobot.datasets.io_utils import load_stats, write_stats
+from numpy.typing import NDArray
 
+from lerobot_excav.datasets.card.dataset_card import CARD_PATH, PICTURE_PATH, is_own_card
 from lerobot_excav.datasets.format.dataset_info import INFO_PATH
 from lerobot_excav.datasets.format.schema import MASK_KEY, MASK_SOURCE_KEY
 from lerobot_excav.datasets.masks.found_masks import FoundMask
@@ -48,8 +50,10 @@ def write_with_masks(root: Path, out: Path, masks: Masks, provenance: Mapping[st
 
 
 def _left_out(root: Path) -> Any:
-    """Leave out the old masks, and the index, which is about them."""
-    old = {root / "videos" / MASK_KEY, root / "images" / MASK_KEY, root / INDEX_PATH, root / "README.md"}
+    """Leave out the old masks, and what is about them: the index, and a card of ours with its picture."""
+    old = {root / "videos" / MASK_KEY, root / "images" / MASK_KEY, root / INDEX_PATH}
+    if is_own_card(root):
+        old |= {root / CARD_PATH, root / PICTURE_PATH}
     return lambda folder, names: [name for name in names if Path(folder, name) in old]
 
 
@@ -102,7 +106,7 @@ def _write_statistics(root: Path, masks: Masks) -> None:
     write_stats((load_stats(root) or {}) | written, root)
 
 
-def _statistics(found: Sequence[FoundMask]) -> dict[str, np.ndarray]:
+def _statistics(found: Sequence[FoundMask]) -> dict[str, NDArray[Any]]:
     pictures = np.stack([np.repeat(255 * mask.pixels[None].astype(np.uint8), 3, axis=0) for mask in found])
     seen = get_feature_stats(pictures, axis=(0, 2, 3), keepdims=True)
     return {name: value if name == "count" else np.squeeze(value / 255.0, axis=0) for name, value in seen.items()}

@@ -9,6 +9,7 @@ from lerobot_excav.datasets.format.schema import (
     COMMAND_KEY,
     MASK_SOURCE_KEY,
     PAIR_KEY,
+    REST_KEY,
     SCENE_KEY,
     STAGE_KEY,
     TARGET_KEY,
@@ -24,17 +25,20 @@ from lerobot_excav.errors import DatasetError
 def needed_keys(spec: TaskSpec) -> list[str]:
     """Return the columns that say how an episode began and what was done in it."""
     settings = [setting_key(name) for name in spec.settings.columns()]
-    return [ACTION_KEY, COMMAND_KEY, MASK_SOURCE_KEY, PAIR_KEY, SCENE_KEY, STAGE_KEY, TARGET_KEY, *settings]
+    start = [PAIR_KEY, SCENE_KEY, STAGE_KEY, TARGET_KEY, COMMAND_KEY]
+    return [ACTION_KEY, REST_KEY, MASK_SOURCE_KEY, *start, *settings]
 
 
 def find_masks(recorded: EpisodeTable, source: MaskSource, *, fps: int, size: tuple[int, int]) -> list[FoundMask]:
     """Return the masks of all commands of an episode, in the size (H, W) of its pictures.
 
     Raises:
-        DatasetError: The source finds nothing for a command.
+        DatasetError: The source finds nothing for a command, or the old mask is tinted into the pictures.
     """
     spec = recorded.spec
-    settings = {"scene_set": recorded.pair.scene_set, "fps": fps, **recorded.settings}
+    require_untinted(recorded)
+    length = spec.replay_length(recorded.length + recorded.rest_frames)
+    settings = {"scene_set": recorded.pair.scene_set, "fps": fps, "episode_length": length, **recorded.settings}
     env = spec.make_env(
         obs_type="agent_pos", render_mode=None, observation_height=size[0], observation_width=size[1], **settings
     )
@@ -47,6 +51,19 @@ def find_masks(recorded: EpisodeTable, source: MaskSource, *, fps: int, size: tu
             if frame in changes:
                 masks.append(_mask(env, source, recorded, frame=frame))
     return masks
+
+
+def require_untinted(recorded: EpisodeTable) -> None:
+    """Check that the pictures themselves show no target.
+
+    Raises:
+        DatasetError: They do: another mask would contradict them.
+    """
+    if "as overlay" in recorded.mask_changes:
+        raise DatasetError(
+            f"episode {recorded.index}: the old mask is tinted into its pictures (target_overlay), and another one "
+            "would contradict it; record it again without the overlay"
+        )
 
 
 def _mask(env: MaskedTaskEnv[Any, Any], source: MaskSource, recorded: EpisodeTable, *, frame: int) -> FoundMask:

@@ -4,6 +4,7 @@ A region of uniform sand has no edge in a picture, and the mask of SAM 2 is that
 ground comes from depth, as with `geometry`, and the mask of the pile bounds it.
 """
 
+import hashlib
 from typing import Annotated
 
 import numpy as np
@@ -44,7 +45,7 @@ class GroundedSamOptions(MaskOptions):
 
 
 class GroundedSamSource:
-    """Looks for words in the picture; both models run once for a scene and its words, never in a loop of control."""
+    """Looks for words in the picture; both models run once for a picture and its words."""
 
     def __init__(self, options: GroundedSamOptions) -> None:
         self._options = options
@@ -63,7 +64,7 @@ class GroundedSamSource:
         """
         words = self._options.text or view.words(command)
         shot = view.shot()
-        found, fine = self._look(shot.picture, (view.scene_key, words))
+        found, fine = self._look(shot.picture, words)
         if found is None:
             return None
         facts = {"words": words, "score": round(found.score, 3), "box": [round(edge, 1) for edge in found.box]}
@@ -78,9 +79,11 @@ class GroundedSamSource:
             return None
         return TargetMask(pixels=pixels, target_id=command.target_id, source="grounded_sam", parameters=facts)
 
-    def _look(self, picture: NDArray[np.uint8], key: tuple[object, str]) -> tuple[Detection | None, Pixels]:
+    def _look(self, picture: NDArray[np.uint8], words: str) -> tuple[Detection | None, Pixels]:
+        # Not the scene: it may look otherwise now, and its number may be that of another one elsewhere.
+        key = hashlib.sha256(picture.tobytes()).hexdigest(), words
         if self._known is None or self._known[0] != key:
-            found = self._detector.find(picture, key[1])
+            found = self._detector.find(picture, words)
             empty = np.zeros(picture.shape[:2], dtype=bool)
             self._known = key, found, empty if found is None else self._segmenter.pixels(picture, found.box)
         return self._known[1:]

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, require_transformers
+from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, load_model, require_transformers
 from lerobot_excav.envs.masks.segment_anything import Box
+from lerobot_excav.errors import require
 
 GROUNDING_DINO = ModelName(name="IDEA-Research/grounding-dino-tiny")
 
@@ -66,15 +67,23 @@ class Detector:
             from transformers import GroundingDinoForObjectDetection, GroundingDinoProcessor
 
             processor = load(GroundingDinoProcessor.from_pretrained, self._name, download=self._placement.download)
-            model = load(GroundingDinoForObjectDetection.from_pretrained, self._name, download=self._placement.download)
-            self._loaded = processor, model.to(self._placement.device).eval()
+            self._loaded = (
+                processor,
+                load_model(GroundingDinoForObjectDetection.from_pretrained, self._name, self._placement),
+            )
         return self._loaded
 
 
 def phrase(words: str) -> str:
-    """Return words as the model wants them: in lower case, each phrase with a full stop behind it."""
+    """Return words as the model wants them: in lower case, each phrase with a full stop behind it.
+
+    Raises:
+        ConfigurationError: There are none.
+    """
     parts = [part.strip().lower() for part in words.split(".")]
-    return " ".join(f"{part}." for part in parts if part)
+    said = " ".join(f"{part}." for part in parts if part)
+    require(bool(said), f"the words {words!r} say nothing to look for; give --mask.text, or text in mask_options")
+    return said
 
 
 def clipped(box: list[float], size: tuple[int, int]) -> Box | None:

@@ -1,7 +1,7 @@
 """Mask source `manual`: what a person has drawn or clicked, from a file.
 
     [[mask]]
-    key = "val/3/0/1"                # scene set, scene, stage, target; a cycle of its own after these
+    key = "val/3/0/1"                # scene set, scene, stage, target; in Clear-v0 the cycle behind them, from 0 on
     polygon = [[0.40, 0.55], [0.48, 0.55], [0.48, 0.62], [0.40, 0.62]]
 
     [[mask]]
@@ -80,7 +80,7 @@ class ManualSource:
         self._entries = {entry.key: entry for entry in options.mask}
 
     def mask(self, view: MaskView, command: Command) -> TargetMask | None:
-        """Return the mask of a command; None if what was clicked on is hidden.
+        """Return the mask of a command; None if it covers no pixel.
 
         Raises:
             ConfigurationError: The file says nothing of this situation, or a click hits nothing.
@@ -115,11 +115,14 @@ def _clicked(view: MaskView, entry: Entry) -> Pixels:
         min(int(share * length), length - 1) for share, length in zip(entry.click[::-1], shot.size, strict=True)
     )
     place_w = points_w[row, column]
-    require(
-        bool(np.isfinite(place_w).all()), f"the click {entry.click} of the mask {entry.key!r} hits nothing; move it"
-    )
     patch = view.patch(place_w, shot)
-    return object_by_depth(shot, place_w) if patch is None else patch
+    meant = object_by_depth(shot, place_w) if patch is None else patch
+    require(
+        bool(meant[row, column]),
+        f"the click {entry.click} of the mask {entry.key!r} hits nothing that can be commanded: no object, or no soil "
+        "that is seen; move it",
+    )
+    return meant
 
 
 register_mask_source("manual", ManualSource, options=ManualOptions)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, require
 
 
 class ModelName(BaseModel):
@@ -36,6 +36,28 @@ class Placement(NamedTuple):
     device: str
 
 
+def load_model(kind: Callable[..., Any], model: ModelName, placement: Placement, **options: Any) -> Any:
+    """Load a model, ready to run; see `load`.
+
+    Raises:
+        ConfigurationError: As `load`, or the weights are of another kind of model, or there is no such device.
+    """
+    loaded, report = load(kind, model, download=placement.download, output_loading_info=True, **options)
+    lacking = sorted(report["missing_keys"])
+    require(
+        not lacking,
+        f"the weights {model.name!r} are of another model: they lack {len(lacking)} parts, such as {lacking[:1]}; "
+        "give weights of the kind that this option takes",
+    )
+    try:
+        return loaded.to(placement.device).eval()
+    except (RuntimeError, AssertionError) as error:
+        raise ConfigurationError(
+            f"device={placement.device!r} is not possible: {' '.join(str(error).split())[:200]}; give cpu, or cuda "
+            "where there is one"
+        ) from error
+
+
 def load(kind: Callable[..., Any], model: ModelName, *, download: bool, **options: Any) -> Any:
     """Load a model or its processor, `kind` being its class's `from_pretrained`.
 
@@ -51,7 +73,7 @@ def load(kind: Callable[..., Any], model: ModelName, *, download: bool, **option
     revision = {} if Path(model.name).is_dir() else {"revision": model.revision}
     try:
         return kind(model.name, local_files_only=not download, **revision, **options)
-    except (OSError, ValueError, RuntimeError, KeyError) as error:
+    except Exception as error:  # transformers and safetensors raise a dozen kinds over files that are damaged
         where = os.environ.get("HF_HOME", "~/.cache/huggingface")
         raise ConfigurationError(
             f"the weights {model.name!r} cannot be loaded: {' '.join(str(error).split())[:300]}. Give a folder that "

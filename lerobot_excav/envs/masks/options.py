@@ -1,5 +1,6 @@
 """What a mask source is told, from a file: `--env.mask_options=FILE`."""
 
+import hashlib
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,11 @@ def read_options[Options: MaskOptions](kind: type[Options], name: str, path: Pat
         raise ConfigurationError(
             f"mask_options={path}: {place or 'the file'}: {first['msg']}; the mask source {name!r} takes {allowed}"
         ) from error
+
+
+def options_words(path: Path) -> str:
+    """Return what results say of a file of options: its name and a digest, for its place is nobody's business."""
+    return f"{path.name} ({hashlib.sha256(path.read_bytes()).hexdigest()[:8]})"
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, require_transformers
+from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, load_model, require_transformers
 
 Box = tuple[float, float, float, float]
 """Left, upper, right, lower [px]."""
@@ -47,6 +47,5 @@ class SegmentAnything:
             from transformers import Sam2Model, Sam2Processor
 
             processor = load(Sam2Processor.from_pretrained, self._name, download=self._placement.download)
-            model = load(Sam2Model.from_pretrained, self._name, download=self._placement.download)
-            self._loaded = processor, model.to(self._placement.device).eval()
+            self._loaded = processor, load_model(Sam2Model.from_pretrained, self._name, self._placement)
         return self._loaded

@@ -6,9 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, require_transformers
+from lerobot_excav.envs.masks.model_files import ModelName, Placement, load, load_model, require_transformers
+from lerobot_excav.errors import require
 
 QWEN = ModelName(name="Qwen/Qwen2.5-VL-7B-Instruct")
+
+KINDS = ("qwen2_5_vl", "qwen3_vl", "qwen3_vl_moe")
+"""Kinds of models whose answers are understood."""
 
 RELATIVE = 1000.0
 """Full scale of the boxes of Qwen3-VL, in both axes (source: its model card)."""
@@ -70,6 +74,11 @@ class VisionLanguageModel:
 
             processor = load(AutoProcessor.from_pretrained, self._name, download=self._placement.download)
             kind = AutoModelForImageTextToText.from_pretrained
-            model = load(kind, self._name, download=self._placement.download, dtype="auto")
-            self._loaded = processor, model.to(self._placement.device).eval()
+            model = load_model(kind, self._name, self._placement, dtype="auto")
+            require(
+                str(model.config.model_type) in KINDS,
+                f"the weights {self._name.name!r} are of {model.config.model_type!r}, and how that gives boxes is not "
+                f"known here; allowed: {', '.join(KINDS)}",
+            )
+            self._loaded = processor, model
         return self._loaded

@@ -229,6 +229,7 @@ class CommandedEnv(WatchedEnv):
         command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
         self._commands.append(command)
         self._source = source or self._named_source
+        self._mask = None  # should the source fail, no other target is shown
         self._mask = self._ask(command) if self._shows_pixels else None
 
     def _ask(self, command: Command) -> TargetMask | None:
@@ -238,6 +239,8 @@ class CommandedEnv(WatchedEnv):
             self._move_target(command.target_id, mask.place_w)
             self._commands[-1] = replace(command, region=self._region(command.target_id))
             self._mask_fallbacks += "fallback" in mask.parameters
+            is_moved = self.settings.mask_condition == "random"
+            return mask if is_moved else replace(mask, target_id=command.target_id)
         return mask
 
     def _change_command(self) -> None:

@@ -1,6 +1,7 @@
 """The environment of every task: a command, shown as a mask of the main view, and a machine that is to obey it."""
 
 from abc import abstractmethod
+from pathlib import Path
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.options import options_words
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.commanded import CommandedEnv
@@ -84,6 +86,8 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._source = self._named_source = self._corrupted(
             make_mask_source(self.settings.mask_source, options=self.settings.mask_options)
         )
+        options = self.settings.mask_options
+        self._options_words = None if options is None else options_words(Path(options))
         self._world: World | None = None
         self._renderer: Picture | None = None
         self._selection: Selection | None = None
@@ -174,8 +178,12 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._selection = selection
         self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._commands, self._main_img, self._is_over = [], None, False
-        self._give_command(selection.target_id)
-        self._wait_for_mask()
+        try:
+            self._give_command(selection.target_id)
+            self._wait_for_mask()
+        except BaseException:
+            self._selection = None
+            raise
         self._begin_film(f"{self.task}_{self.settings.scene_set}_{self.scene_id}_{self.stage}_{self.target_id}")
         return self._observe(), self._info(is_over=False)
 
@@ -247,6 +255,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         return {
             "simulation_version": self.task_spec.simulation_version,
             **{name: value for name, value in self.settings.as_dict().items() if value is not None},
+            **({} if self._options_words is None else {"mask_options": self._options_words}),
             "episode_length": self.episode_length,
             "scene_id": self.scene_id,
             "stage": self.stage,

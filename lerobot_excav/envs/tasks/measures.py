@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
 MASK_SETTINGS = {
     "mask_source": "mask sources",
+    "mask_options": "options of mask sources",
     "mask_condition": "mask conditions",
     "mask_noise": "kinds of mask noise",
     "mask_noise_px": "strengths of mask noise",
 }
-"""What says which mask was shown, with its plural for messages; every environment takes these as settings."""
+"""What says which mask was shown, with its plural for messages; every environment takes these as settings, and tells of
+its options the name of the file and a digest."""
 
 
 class EpisodeKey(NamedTuple):
@@ -74,6 +76,7 @@ class EpisodeRecord(BaseModel):
     stage: int = Field(default=0, ge=0)  # cycles dug before the start; files of earlier releases hold stage 0 only
     target_id: TargetId  # commanded first
     mask_source: str
+    mask_options: str = ""  # name of the file and a digest of it; empty without one
     mask_condition: Annotated[str, one_of(MASK_CONDITIONS)]
     mask_noise: Annotated[str, one_of(MASK_NOISES)]
     mask_noise_px: NonNegativeInt

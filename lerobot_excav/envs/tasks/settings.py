@@ -118,7 +118,7 @@ class TaskSettings:
     )
     mask_source: str = setting(
         "What makes the target mask: oracle, which knows the scene; geometry, which looks at depth; manual, masks from "
-        "a file; or a source of another package",
+        "a file; grounded_sam, from words; vlm_dig, a model that chooses where to dig; or a source of another package",
         default="oracle",
         choices=mask_source_names,
     )

@@ -9,6 +9,7 @@ from lerobot.datasets import LeRobotDataset
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.format.schema import MASK_KEY, MASK_SOURCE_KEY
+from lerobot_excav.datasets.masks import make_masks as make_masks_module
 from lerobot_excav.datasets.masks import simulated_starts
 from lerobot_excav.datasets.masks.make_masks import make_masks
 from lerobot_excav.datasets.masks.mask_column import PROVENANCE_PATH
@@ -183,3 +184,50 @@ def test_a_camera_that_is_not_there_is_named(foreign, small_datasets, tmp_path):
         make_masks(foreign, tmp_path / "out", source="manual", options=options)
     with pytest.raises(ConfigurationError, match="has no effect"):
         make_masks(small_datasets["image"], tmp_path / "out", source="oracle", main_camera="observation.images.cab")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("env", ["excavator", "fr5_grasp"])
+def test_depth_makes_the_masks_of_demonstrations_which_then_pass_the_check(env, tmp_path):
+    fast = ["--env.fidelity=fast"] if env == "excavator" else []
+    demos = [f"--env.type={env}", *fast, "--env.episode_length=6", "--scenes=1", "--keep_failures", "--workers=0"]
+    assert main(["demos", *demos, f"--out={tmp_path / 'shown'}"]) == 0
+    assert main(["masks", str(tmp_path / "shown"), "--source=geometry", f"--out={tmp_path / 'by_depth'}"]) == 0
+    assert check_dataset(tmp_path / "by_depth", replays=1).has_passed
+    shown, by_depth = masks_of(tmp_path / "shown"), masks_of(tmp_path / "by_depth")
+    assert np.logical_and(shown, by_depth).sum() > 0.6 * np.logical_or(shown, by_depth).sum()
+
+
+def test_other_options_or_another_dataset_are_no_continuation(small_datasets, foreign, tmp_path, monkeypatch):
+    root, out = small_datasets["image"], tmp_path / "out"
+    monkeypatch.setattr(make_masks_module, "write_with_masks", lambda *_: None)
+    options = drawn(tmp_path, "*")
+    with pytest.raises(DatasetError, match="is not a LeRobot dataset"):  # the copy was not written
+        make_masks(root, out, source="manual", options=options)
+    (tmp_path / "drawn.toml").write_text((tmp_path / "drawn.toml").read_text().replace("0.25", "0.3"))
+    with pytest.raises(DatasetError, match="was not begun by this command with these options"):
+        make_masks(root, out, source="manual", options=options)
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"a": 1}\n{"b"}\n'])
+def test_a_file_that_is_damaged_is_named(small_datasets, tmp_path, content):
+    (tmp_path / "out.masks.jsonl").write_text(content)
+    with pytest.raises(DatasetError, match=r"out\.masks\.jsonl"):
+        make_masks(small_datasets["image"], tmp_path / "out", source="oracle")
+
+
+def test_a_copy_within_the_dataset_and_one_text_for_all_targets_are_refused(paired_dataset, tmp_path):
+    with pytest.raises(ConfigurationError, match="lies within"):
+        make_masks(paired_dataset, paired_dataset / "masked", source="oracle")
+    with pytest.raises(ConfigurationError, match="the same thing for all targets"):
+        make_masks(paired_dataset, tmp_path / "out", source="grounded_sam", text="the red block")
+
+
+@pytest.mark.parametrize("text", ["block #2", "no", "007", "red: block"])
+def test_a_text_is_taken_as_it_stands(foreign, tmp_path, monkeypatch, text):
+    told = {}
+    monkeypatch.setattr(
+        "lerobot_excav.datasets.masks.make_masks.make_masks", lambda *_, **options: told.update(options)
+    )
+    main(["masks", str(foreign), "--source=grounded_sam", f"--mask.text={text}", f"--out={tmp_path / 'out'}"])
+    assert told["text"] == text

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.masks.manual import polygon_pixels
 from lerobot_excav.envs.masks.object_pixels import object_by_colour, object_by_depth
 from lerobot_excav.envs.masks.shot import Shot, reduced
+from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.errors import ConfigurationError
@@ -177,3 +178,60 @@ def test_settings_of_masks_go_into_files(tmp_path):
     settings = options(tmp_path, '[[mask]]\nkey = "*"\nclick = [0.5, 0.5]\n')
     env = FR5GraspEnv(render_mode=None, **settings)
     assert json.loads(json.dumps(env.settings.as_dict()))["mask_options"] == settings["mask_options"]
+
+
+def test_a_scene_that_was_dug_looks_as_at_first_when_it_is_shown_again():
+    env = ExcavatorEnv(fidelity="fast", render_mode=None, scene_set="val", mask_source="geometry")
+    env.reset(options=START)
+    first, depth_m = env.mask.pixels.copy(), env.shot().depth_m
+    operator = env.task_spec.make_operator(np.random.default_rng(0))
+    operator.reset(env)
+    for _ in range(90):  # until a bucket of soil is gone
+        env.step(operator.act(env))
+    assert env.cycle.state.bucket_mass_kg > 100.0
+    env.reset(options=START)
+    assert np.array_equal(env.shot().depth_m, depth_m)
+    assert np.array_equal(env.mask.pixels, first)
+    env.close()
+
+
+def test_a_click_that_hits_nothing_is_an_error(make, tmp_path):
+    with pytest.raises(ConfigurationError, match=r"the click .* hits nothing that can be commanded"):
+        make(**options(tmp_path, '[[mask]]\nkey = "*"\nclick = [0.5, 0.01]\n'))
+
+
+def test_every_cycle_of_clearing_has_a_key_of_its_own(tmp_path):
+    polygons = {0: "[[0, 0], [0.5, 0], [0.5, 0.5]]", 1: "[[0.5, 0.5], [1, 0.5], [1, 1]]"}
+    text = "".join(f'[[mask]]\nkey = "val/3/0/0/{cycle}"\npolygon = {shape}\n' for cycle, shape in polygons.items())
+    env = ClearEnv(fidelity="fast", render_mode=None, scene_set="val", **options(tmp_path, text))
+    env.reset(options={"scene_id": 3})
+    assert env.mask.parameters["key"] == "val/3/0/0/0"
+    while not env.clearing.records:  # the machine stands still until the cycle's time is over
+        env.step(env.holding_action())
+    assert env.mask.parameters["key"] == "val/3/0/0/1"
+    env.close()
+
+
+def test_a_source_that_fails_at_a_change_of_command_leaves_no_old_mask(tmp_path):
+    text = '[[mask]]\nkey = "val/3/0/1"\npolygon = [[0, 0], [0.5, 0], [0.5, 0.5]]\n'
+    env = FR5GraspEnv(render_mode=None, scene_set="val", retarget_frame=1, **options(tmp_path, text))
+    env.reset(options=START)
+    with pytest.raises(ConfigurationError, match="no mask with key"):
+        env.step(env.holding_action())
+    assert env.mask is None
+    with pytest.raises(ConfigurationError, match="no mask with key"):
+        env.reset(options={"scene_id": 9, "target_id": 0})
+    with pytest.raises(ConfigurationError, match=r"call reset\(\) first"):
+        env.step(env.holding_action())
+    env.close()
+
+
+def test_results_name_the_options_by_file_and_digest_and_not_by_place(tmp_path):
+    settings = options(tmp_path, '[[mask]]\nkey = "*"\npolygon = [[0, 0], [1, 0], [1, 1]]\n')
+    env = FR5GraspEnv(render_mode=None, episode_length=1, **settings)
+    env.reset(options=START)
+    *_, info = env.step(env.holding_action())
+    words = info["episode_metrics"]["mask_options"]
+    assert words.startswith("options.toml (")
+    assert str(tmp_path) not in words
+    env.close()

@@ -1,6 +1,7 @@
 """Masks from words: the real classes of transformers with tiny random weights, and golden numbers made by hand."""
 
 import importlib.util
+import shutil
 import sys
 from types import SimpleNamespace
 
@@ -167,7 +168,7 @@ def test_in_sand_depth_tells_the_region_and_the_mask_of_the_pile_bounds_it(optio
 
 @pytest.mark.parametrize(
     ("words", "expected"),
-    [("The Red Block", "the red block."), ("a. B .", "a. b."), (" sand. ", "sand."), ("", "")],
+    [("The Red Block", "the red block."), ("a. B .", "a. b."), (" sand. ", "sand.")],
 )
 def test_phrases_are_lower_case_and_end_with_a_full_stop(words, expected):
     assert phrase(words) == expected
@@ -212,3 +213,35 @@ def test_wrong_options_are_named(tmp_path, text, words):
 def test_provenance_names_a_folder_by_its_last_part_and_a_revision(weights):
     assert ModelName(name=str(weights / "dino")).words == "dino"
     assert ModelName(name="a/b", revision="abc").words == "a/b@abc"
+
+
+def test_weights_of_another_model_are_refused(weights):
+    swapped = SegmentAnything(ModelName(name=str(weights / "dino")), HERE)
+    with pytest.raises(ConfigurationError, match=r"cannot be loaded|are of another model"):
+        swapped.pixels(PICTURE, (0.0, 0.0, 9.0, 9.0))
+
+
+def test_damaged_weights_and_a_device_that_is_not_there_are_named(weights, tmp_path):
+    shutil.copytree(weights / "sam2", tmp_path / "sam2")
+    path = tmp_path / "sam2" / "model.safetensors"
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(ConfigurationError, match="cannot be loaded"):
+        SegmentAnything(ModelName(name=str(tmp_path / "sam2")), HERE).pixels(PICTURE, (0.0, 0.0, 9.0, 9.0))
+    nowhere = Placement(download=False, device="gpu")
+    with pytest.raises(ConfigurationError, match="device='gpu' is not possible"):
+        SegmentAnything(ModelName(name=str(weights / "sam2")), nowhere).pixels(PICTURE, (0.0, 0.0, 9.0, 9.0))
+
+
+def test_another_picture_of_the_same_scene_is_looked_at_again(options, monkeypatch):
+    asked = []
+    monkeypatch.setattr(Detector, "find", lambda self, picture, words: asked.append(words))
+    env = FR5GraspEnv(render_mode=None, scene_set="val", episode_length=2, **options())
+    env.reset(options=START)
+    env.reset(options={"scene_id": 4, "target_id": 1})
+    assert len(asked) == 2
+    env.close()
+
+
+def test_words_that_say_nothing_are_refused():
+    with pytest.raises(ConfigurationError, match="say nothing to look for"):
+        phrase(" . ")

@@ -39,6 +39,8 @@ class ExcavatorMachine:
         self.container = container
         self.model = build_spec(container).compile()
         self.data = mujoco.MjData(self.model)
+        # What the skins of the model show of the soil, part by part; all pictures of it share them.
+        self.soil_shown: dict[str, NDArray[np.float64]] = {}
         self._troubles = [self.data.warning[kind] for kind in _DIVERGENCE]
         self._control = RateControl()
         self._resistance = JointResistance(self.model)

@@ -42,7 +42,8 @@ class SoilPicture:
         self._box_grid = surfaces.box_grid(machine.container)
         self._grains = Grains(model)
         self._load = LoadPicture(model)
-        self._shown: dict[str, NDArray[np.float64]] = {}
+        # Several pictures of one model write the same skins: what is shown is known of the model, not of the picture.
+        self._shown = machine.soil_shown if model is machine.model else dict[str, NDArray[np.float64]]()
 
     def update(self, soil: Soil, start_heights_m: NDArray[np.float64]) -> None:
         """Move the vertices of all skins to where the soil is now, if it has moved.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
+from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import MaskSource
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
@@ -186,6 +187,11 @@ class ClearEnv(ExcavatorEnv):
     def scene_key(self) -> tuple[int, ...]:
         """Numbers of the scene set, of the scene and of the cycle."""
         return (*super().scene_key, len(self._clearing.records))
+
+    @override
+    def command_key(self, command: Command) -> str:
+        """Return `SCENE_SET/SCENE/STAGE/TARGET/CYCLE`, by which files of masks name a situation."""
+        return f"{super().command_key(command)}/{len(self._clearing.records)}"
 
     # What is told.
 

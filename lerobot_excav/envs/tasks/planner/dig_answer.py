@@ -12,6 +12,7 @@ from lerobot_excav.envs.masks.grounding import clipped
 from lerobot_excav.envs.masks.segment_anything import Box
 from lerobot_excav.envs.masks.vision_language import Answer
 from lerobot_excav.envs.tasks.planner.candidates import Candidates
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface
 
 LONGEST_REASON = 500
 
@@ -25,7 +26,7 @@ class DigAnswer(BaseModel):
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
-    box: Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat], Field()]
+    box: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
     reason: Annotated[str, Field(max_length=LONGEST_REASON)] = ""
 
 
@@ -50,14 +51,22 @@ def read_answer(answer: Answer, size: tuple[int, int]) -> tuple[Box, str]:
     return box, parsed.reason
 
 
-def require_place(place_w: NDArray[np.float64], reach_m: tuple[float, float], radius_m: float) -> None:
-    """Check that the bucket reaches a place (3,) [m] that lies `radius_m` from the swing axis.
+def require_soil(place_w: NDArray[np.float64], surface: SeenSurface) -> None:
+    """Check that a place (3,) [m] is soil that is seen, and no part of the machine.
 
     Raises:
-        UnusableAnswerError: There is no ground, or it is out of reach.
+        UnusableAnswerError: It is not.
     """
-    if not np.isfinite(place_w).all():
-        raise UnusableAnswerError("in the middle of its box there is no ground")
+    if not surface.shows(place_w[None])[0]:
+        raise UnusableAnswerError("in the middle of its box there is no soil")
+
+
+def require_reach(radius_m: float, reach_m: tuple[float, float]) -> None:
+    """Check that the bucket reaches a place so far from the swing axis [m].
+
+    Raises:
+        UnusableAnswerError: It is out of reach.
+    """
     low_m, high_m = reach_m
     if not low_m <= radius_m <= high_m:
         raise UnusableAnswerError(f"its place is {radius_m:.1f} m away, and the bucket digs from {low_m} to {high_m} m")

@@ -24,7 +24,8 @@ from lerobot_excav.envs.tasks.planner.dig_answer import (
     UnusableAnswerError,
     read_answer,
     require_diggable,
-    require_place,
+    require_reach,
+    require_soil,
 )
 from lerobot_excav.envs.tasks.planner.plan import Plan
 from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
@@ -110,7 +111,8 @@ class VlmDigSource:
         try:
             box, reason = read_answer(answer, shot.size)
             place_w = _middle(shot, box)
-            require_place(place_w, REACH_M, float(np.hypot(*(place_w[:2] - np.asarray(MACHINE_POS_W[:2])))))
+            require_soil(place_w, surface)
+            require_reach(float(np.hypot(*(place_w[:2] - np.asarray(MACHINE_POS_W[:2])))), REACH_M)
             require_diggable(view.rated(place_w[None], surface))
         except UnusableAnswerError as unusable:
             self._fallback = f"{self._options.model.words}: {unusable}"

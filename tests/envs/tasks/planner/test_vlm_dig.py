@@ -91,7 +91,7 @@ def test_what_the_model_chooses_is_commanded_and_judged(answers, liked):
         ('{"box": "left"}', "not what was asked for"),
         ('{"box": [600, 10, 700, 20]}', "beside the picture"),
         ('{"box": [5, 5, 5, 40]}', "beside the picture, or is empty"),
-        (json.dumps({"box": [0, 0, 4, 4]}), "no ground|m away|not worth a cycle"),
+        (json.dumps({"box": [0, 0, 4, 4]}), "no soil"),
     ],
 )
 def test_what_cannot_be_done_is_left_to_the_planner_with_a_warning_and_counted(answers, caplog, liked, answer, why):
