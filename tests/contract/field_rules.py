@@ -104,6 +104,19 @@ def each(rule):
     return Rule(lambda v: isinstance(v, list | tuple) and all(map(rule.allows, v)), tuple([e] for e in rule.examples))
 
 
+def sizes(offsets, lengths, most=4096):
+    """A list of so many offsets from 0 on, and of so many lengths from 16 on [px]."""
+    least = [0] * offsets + [16] * lengths
+
+    def allows(value):
+        is_list = isinstance(value, list | tuple) and len(value) == len(least)
+        return is_list and all(is_whole(v) and low <= v <= most for v, low in zip(value, least, strict=True))
+
+    return Rule(
+        allows, (least, [*least[:-1], 15], least[1:], [*least, 16], [*least[:-1], most], [*least[:-1], most + 1])
+    )
+
+
 def numbered(*names):
     """Names, each with a number of its own on a device."""
 
@@ -191,6 +204,8 @@ POLICY = {
     "lr_schedule": optional(one_of("constant", "cosine")),
     "lr_warmup_steps": optional(whole(0, ENDLESS)),
     **dict.fromkeys(("preset", "preset_applied"), optional(one_of("paper", "fast"))),
+    "crop": optional(sizes(2, 2)),
+    "resize_to": optional(sizes(0, 2)),
     "augment_shift_px": whole(0, 1024),
     "compare_masks": flag,
     "mask_key": feature_name,

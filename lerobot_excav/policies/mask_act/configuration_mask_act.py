@@ -12,6 +12,7 @@ from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.policies.mask_act.features import NORMALISED, check_features, check_normalization
+from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
 from lerobot_excav.setting import check_settings, setting
@@ -67,6 +68,18 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         "Show the backbone the row and column of every pixel as two more channels, so that the plain fourth channel "
         "can tell where it lies",
         default=False,
+    )
+    crop: list[int] | None = setting(
+        "Top, left, height and width of the part of the main picture and its mask that is used [px]; left out: all",
+        default=None,
+        low=0,
+        high=4096,
+    )
+    resize_to: list[int] | None = setting(
+        "Height and width to which all pictures and the mask are brought [px]; left out: they stay",
+        default=None,
+        low=0,
+        high=4096,
     )
     augment_shift_px: int = setting(
         "In training, move the main picture and its mask together by up to this much along each axis, drawn for each "
@@ -167,6 +180,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         self._apply_rules()
         self._check_plan()
         self._check_network()
+        require_framing(self.crop, self.resize_to, None)
         super().__post_init__()
 
     def _check_names(self) -> None:
@@ -314,6 +328,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"policy.augment_shift_px={self.augment_shift_px} would move {self.main_camera_key} of shape {main_shape} "
             f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
         )
+        require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:
             require_mask_shape(self.mask_key, tuple(mask.shape), self.main_camera_key, main_shape)

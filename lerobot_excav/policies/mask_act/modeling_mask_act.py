@@ -14,6 +14,7 @@ from torch import Tensor
 from lerobot_excav.errors import require_choice
 from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights, require_processors
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
+from lerobot_excav.policies.mask_act.framing import framed
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
@@ -178,8 +179,16 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         return {**batch, main: picture}, mask
 
     def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
+        config = self.config
+        views, mask = framed(
+            masked_views(config, batch, mask),
+            mask,
+            main=config.camera_keys.index(config.main_camera_key),
+            crop=config.crop,
+            resize_to=config.resize_to,
+        )
         plan: tuple[Tensor, Latent | None] = self.model(
-            masked_views(self.config, batch, mask),
+            views,
             mask,
             state=batch[OBS_STATE] if self.config.robot_state_feature else None,
             env_state=batch[OBS_ENV_STATE] if self.config.env_state_feature else None,

@@ -11,7 +11,7 @@ def test_the_oracle_is_known():
 
 
 def test_an_unknown_source_is_named_with_the_known_ones():
-    with pytest.raises(ConfigurationError, match="mask_source='crystal ball' is not known; allowed: .*'oracle'"):
+    with pytest.raises(ConfigurationError, match=r"mask_source='crystal ball' is not known; allowed: .*'oracle'"):
         make_mask_source("crystal ball")
 
 
