@@ -7,6 +7,8 @@
 | policy | `mask_act` | `MaskACTConfig` |
 | robot | `excavator_sim` | `ExcavatorSimConfig` |
 | robot | `fr5_sim` | `FR5SimConfig` |
+| camera | `shared` | `SharedCameraConfig` |
+| camera | `mask` | `MaskCameraConfig` |
 | teleoperator | `excavator_joystick` | `ExcavatorJoystickConfig` |
 | teleoperator | `excavator_keyboard` | `ExcavatorKeyboardConfig` |
 | teleoperator | `excavator_operator` | `ExcavatorOperatorConfig` |
@@ -18,6 +20,8 @@ Importing a configuration registers it. LeRobot finds the class that belongs to 
 so no simulator is loaded here.
 """
 
+from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
+from lerobot_excav.cameras.shared_camera.config_shared_camera import SharedCameraConfig
 from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
 from lerobot_excav.envs.plugins import load_plugins
@@ -43,6 +47,8 @@ __all__ = [
     "FR5SimConfig",
     "FR5WebConfig",
     "MaskACTConfig",
+    "MaskCameraConfig",
+    "SharedCameraConfig",
 ]
 
 # Tasks and mask sources of other packages, for the commands that find this one.

@@ -23,7 +23,7 @@ LAYERS = [
             "envs.tasks",
             "envs",
         ),
-        *("page", "robots", "teleoperators", "datasets", "evaluation", "console", "scripts"),
+        *("cameras", "page", "robots", "teleoperators", "datasets", "evaluation", "console", "scripts"),
     ],
     ["policies"],
 ]

@@ -17,6 +17,7 @@ from lerobot_excav.datasets.masks import recorded_pictures, simulated_starts
 from lerobot_excav.datasets.masks.found_masks import FoundMask, FoundMasks
 from lerobot_excav.datasets.masks.mask_column import write_with_masks
 from lerobot_excav.datasets.pairs.paired_index import write_index
+from lerobot_excav.envs.masks.picture_view import PictureView
 from lerobot_excav.envs.masks.source import MaskSource, chooses_target, make_mask_source
 from lerobot_excav.errors import require
 
@@ -109,9 +110,7 @@ def _of_others(root: Path, info: DatasetInfo, source: MaskSource, camera: str) -
         yield index, partial(_of_picture, view, index, source)
 
 
-def _of_picture(
-    view: Callable[[int], recorded_pictures.RecordedPicture], index: int, source: MaskSource
-) -> list[FoundMask]:
+def _of_picture(view: Callable[[int], PictureView], index: int, source: MaskSource) -> list[FoundMask]:
     return recorded_pictures.find_masks(view(index), source, index)
 
 

@@ -1,0 +1,1 @@
+"""A camera that delivers the target mask of a shared camera."""

@@ -1,0 +1,112 @@
+"""The mask camera itself."""
+
+from typing import Any, override
+
+import numpy as np
+from lerobot.cameras import Camera
+from numpy.typing import NDArray
+
+from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
+from lerobot_excav.cameras.shared_camera.shared_camera import SharedCamera
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.picture_view import PictureView
+from lerobot_excav.envs.masks.source import MaskMissingError, make_mask_source
+from lerobot_excav.errors import ConfigurationError, DeviceError
+
+KEY = "live"
+"""By which a file of masks names what this camera sees."""
+
+
+class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """Delivers one mask until its command changes: it is made of the picture that the shared camera shows then.
+
+    The first mask is made of the first picture, which may take a while; after that a read costs nothing.
+    """
+
+    def __init__(self, config: MaskCameraConfig) -> None:
+        super().__init__(config)
+        self.config = config
+        self._is_connected = False
+        self._told: str | None = None
+        self._mask: NDArray[np.uint8] | None = None
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether masks are delivered."""
+        return self._is_connected
+
+    @staticmethod
+    def find_cameras() -> list[dict[str, Any]]:
+        """Return none: this is no device."""
+        return []
+
+    @override
+    def connect(self, warmup: bool = True) -> None:
+        """Make ready; the shared camera may be connected later."""
+        self._is_connected, self._mask = True, None
+
+    @override
+    def disconnect(self) -> None:
+        """Forget the mask."""
+        self._is_connected, self._mask = False, None
+
+    @override
+    def read(self) -> NDArray[np.uint8]:
+        """Return the mask, (H, W, 3) uint8 of {0, 255}.
+
+        Raises:
+            DeviceError: The camera or the shared one is not connected.
+            MaskMissingError: The source finds nothing, so that a policy would act without a target.
+            ConfigurationError: The command file cannot be read, or the shared camera has another size.
+        """
+        if not self._is_connected:
+            raise DeviceError(f"the mask camera of {self.config.of!r} is not connected; call connect() first")
+        told = self._read_command()
+        if self._mask is None or told != self._told:
+            self._mask = self._make(told)
+            self._told = told
+        return self._mask.copy()
+
+    @override
+    def async_read(self, timeout_ms: float = 200.0) -> NDArray[np.uint8]:
+        """Return the mask, as `read`."""
+        return self.read()
+
+    @override
+    def read_latest(self, max_age_ms: int = 500) -> NDArray[np.uint8]:
+        """Return the mask, as `read`."""
+        return self.read()
+
+    def _read_command(self) -> str | None:
+        if self.config.command is None:
+            return self.config.text
+        try:
+            return self.config.command.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigurationError(
+                f"command={self.config.command} of the mask camera cannot be read ({error}); write the target into it"
+            ) from error
+
+    def _make(self, told: str | None) -> NDArray[np.uint8]:
+        config = self.config
+        shared = SharedCamera.connected.get(config.of)
+        if shared is None:
+            raise DeviceError(
+                f"no shared camera {config.of!r} is connected; give the robot one: {{type: shared, name: {config.of}, "
+                "camera: ...}"
+            )
+        picture = shared.last_picture()
+        if picture.shape[:2] != (config.height, config.width):
+            raise ConfigurationError(
+                f"the shared camera {config.of!r} gives {picture.shape[:2]}, the mask camera was set up for "
+                f"{(config.height, config.width)} (height, width); give both the same size"
+            )
+        source = make_mask_source(config.source, options=config.options, text=told)
+        view = PictureView(picture, key=KEY, words=told or "")
+        mask = source.mask(view, Command(target_id=0, region=None))
+        if mask is None or not mask.pixels.any():
+            raise MaskMissingError(
+                f"source={config.source!r} of the mask camera finds nothing in the picture of {config.of!r} for "
+                f"{told or config.options!r}, so a policy had no target; say it otherwise, or move the camera"
+            )
+        return mask.img

@@ -1,0 +1,1 @@
+"""A camera whose pictures a mask camera may look at."""
