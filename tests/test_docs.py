@@ -34,7 +34,14 @@ INVENTED = {
     "--env.mask_source=redness": "--env.mask_source=oracle",
     "--policy.mask_strength=2": None,
 }
-INVENTED_FILES = {"lerobot_env_redness.py", "config_toy_reach_sim.py", "toy_reach_sim.py"}
+INVENTED_FILES = {
+    "lerobot_env_redness.py",
+    "sam.toml",
+    "vlm.toml",
+    "drawn.toml",
+    "config_toy_reach_sim.py",
+    "toy_reach_sim.py",
+}
 
 OLDER_WORDS = re.compile(
     r"--env=|bench (soil|operator|fuzz)|lerobot-excav experiment|stages\.toml|version 1\b| anew|it is not so"

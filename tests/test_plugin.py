@@ -101,4 +101,5 @@ def test_the_list_is_complete():
         "excavator_web",
         "excavator_keyboard",
     }
-    assert registered == {*excavator, "fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web", "mask_act"}
+    arm, cameras = {"fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web"}, {"mask", "shared"}
+    assert registered == {*excavator, *arm, *cameras, "mask_act"}

@@ -85,4 +85,4 @@ class RerunLog:
 def open_recording() -> Any | None:
     """Return the module `rerun` if a recording is open in this process, else None."""
     rerun = sys.modules.get("rerun")
-    return rerun if rerun is not None and rerun.get_global_data_recording() is not None else None
+    return rerun if rerun is not None and rerun.get_data_recording() is not None else None

@@ -37,15 +37,16 @@ def arm(tmp_path):
 
 def recorded(robot, path, frames=2):
     """Drive a robot as LeRobot's loops do, into a file; return what the file holds, by path."""
-    rerun.init("test")
-    rerun.save(path)
     log_rerun_data.blueprint = None
     action = dict(zip(robot.task_spec.action_names, map(float, robot.env.holding_action()), strict=True))
-    for _ in range(frames):
-        observation = robot.get_observation()
-        robot.send_action(action)
-        log_rerun_data(observation=observation, action=action)
-    rerun.rerun_shutdown()
+    with rerun.RecordingStream("test") as recording:  # LeRobot's own would stay open for all tests that follow
+        recording.save(path)
+        for _ in range(frames):
+            observation = robot.get_observation()
+            robot.send_action(action)
+            log_rerun_data(observation=observation, action=action)
+        recording.flush()
+        recording.disconnect()
     return {column.entity_path for column in load_recording(path).schema().component_columns()}
 
 
@@ -71,7 +72,7 @@ def test_the_ground_is_logged_as_the_soil_lies(excavator, monkeypatch):
 
 
 def test_without_a_recording_nothing_is_drawn(excavator, monkeypatch):
-    monkeypatch.setattr(rerun, "get_global_data_recording", lambda: None)
+    assert rerun.get_data_recording() is None
     monkeypatch.setattr(rerun, "log", lambda *_, **__: pytest.fail("logged"))
     excavator.get_observation()
 

@@ -23,7 +23,7 @@ def lerobot_doctor(programs: Path, dataset: Path) -> list[Finding]:
         RuntimeError: It ended without a verdict.
     """
     command = [str(programs / "lerobot-doctor"), str(dataset), "--ci", "--fail-on=warn"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
     start = done.stdout.find("{")
     if start < 0:
         raise RuntimeError(f"lerobot-doctor says nothing about {dataset}: {done.stderr[-500:]}")
@@ -45,7 +45,7 @@ def robovet(programs: Path, dataset: Path) -> list[Finding]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "report.json"
         command = [str(programs / "robovet"), "doctor", str(dataset), "--json", str(path)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
         if not path.exists():
             raise RuntimeError(f"robovet says nothing about {dataset}: {(done.stdout + done.stderr)[-500:]}")
         report = json.loads(path.read_text(encoding="utf-8"))

@@ -54,24 +54,10 @@ def make_masks(
         ConfigurationError: There is no such source, or it cannot be used here.
     """
     require_free(out)
-    require(
-        root.resolve() not in out.resolve().parents, f"--out={out} lies within {root}; choose a folder outside of it"
-    )
-    require(
-        not chooses_target(source),
-        f"--source={source} chooses where to act by itself, and recorded actions lead elsewhere; take another source",
-    )
-    made = make_mask_source(source, options=options, text=text)
     info = read_info(root)
     is_ours = PAIR_KEY in info.features
-    require(
-        not (is_ours and main_camera),
-        f"--main_camera={main_camera} has no effect: these demonstrations have a camera that is called main",
-    )
-    require(
-        not (is_ours and text is not None),
-        f"--mask.text={text!r} would name the same thing for all targets; leave it out: each has its name here",
-    )
+    _require_use(root, out, source, main_camera, text, is_ours=is_ours)
+    made = make_mask_source(source, options=options, text=text)
     settings = {
         **{"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera},
         "told": None if options is None else _digest([Path(options)]),
@@ -94,6 +80,27 @@ def make_masks(
             (folder / "dataset").rename(out)
         found.clear()
     return info.total_episodes
+
+
+def _require_use(
+    root: Path, out: Path, source: str, main_camera: str | None, text: str | None, *, is_ours: bool
+) -> None:
+    """Refuse what could not be done, or would have no effect."""
+    require(
+        root.resolve() not in out.resolve().parents, f"--out={out} lies within {root}; choose a folder outside of it"
+    )
+    require(
+        not chooses_target(source),
+        f"--source={source} chooses where to act by itself, and recorded actions lead elsewhere; take another source",
+    )
+    require(
+        not (is_ours and main_camera),
+        f"--main_camera={main_camera} has no effect: these demonstrations have a camera that is called main",
+    )
+    require(
+        not (is_ours and text is not None),
+        f"--mask.text={text!r} would name the same thing for all targets; leave it out: each has its name here",
+    )
 
 
 def _of_ours(root: Path, info: DatasetInfo, source: MaskSource) -> Iterator[Episode]:

@@ -1,4 +1,4 @@
-"""What the mask source `vlm_dig` can be told; importing this makes the source known."""
+"""What the mask source `vlm_dig` can be told."""
 
 from typing import Annotated
 
@@ -7,7 +7,6 @@ from pydantic import Field
 from lerobot_excav.envs.masks.model_files import ModelName
 from lerobot_excav.envs.masks.options import MaskOptions
 from lerobot_excav.envs.masks.segment_anything import SAM2
-from lerobot_excav.envs.masks.source import MaskSource, register_mask_source
 from lerobot_excav.envs.masks.vision_language import QWEN
 
 
@@ -29,13 +28,3 @@ class VlmDigOptions(MaskOptions):
     most_tokens: Annotated[int, Field(ge=16, le=4096)] = 256
     download: bool = False
     device: str = "cpu"
-
-
-def _make(options: VlmDigOptions) -> MaskSource:
-    # Loaded only now, so that commands can list the sources quickly.
-    from lerobot_excav.envs.tasks.planner.vlm_dig import VlmDigSource
-
-    return VlmDigSource(options)
-
-
-register_mask_source("vlm_dig", _make, options=VlmDigOptions, chooses=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import lerobot_excav.envs.tasks.planner.vlm_options  # noqa: F401 - makes the source known
+import lerobot_excav.envs.tasks.planner.vlm_source  # noqa: F401 - makes the source known
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones, zone_text
