@@ -1,4 +1,7 @@
-"""What a step needs is compiled before `reset` returns."""
+"""What a step needs is compiled before `reset` returns.
+
+Not part of the default run, for it compiles everything: two minutes.
+"""
 
 import os
 import subprocess
