@@ -8,8 +8,13 @@
     key = "*"                        # whatever has no entry of its own
     click = [0.52, 0.61]
 
+    [[mask]]
+    key = "train/0/0/2"
+    box = [0.30, 0.40, 0.38, 0.52]   # left, upper, right, lower: a little larger than the object
+
 Places are shares of the picture's width and height, from its upper left corner. A click on an object marks the object;
-one on the ground marks the region around it that the machine digs. Both need depth; a polygon needs nothing.
+one on the ground marks the region around it that the machine digs. A click needs depth; a polygon and a box do not, and
+what fills the box is told by its colour.
 """
 
 from collections.abc import Sequence
@@ -20,7 +25,7 @@ from PIL import Image, ImageDraw
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.object_pixels import object_by_depth
+from lerobot_excav.envs.masks.object_pixels import object_by_colour, object_by_depth
 from lerobot_excav.envs.masks.options import MaskOptions
 from lerobot_excav.envs.masks.shot import Shot, reduced
 from lerobot_excav.envs.masks.source import MaskView, Pixels, TargetMask, register_mask_source
@@ -44,11 +49,12 @@ class Entry(BaseModel):
     key: Annotated[str, Field(min_length=1)]
     polygon: Annotated[tuple[Place, ...], Field(min_length=3)] | None = None
     click: Place | None = None
+    box: tuple[Share, Share, Share, Share] | None = None
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> Self:
-        if (self.polygon is None) == (self.click is None):
-            raise ValueError("give a polygon or a click")
+        if sum(said is not None for said in (self.polygon, self.click, self.box)) != 1:
+            raise ValueError("give a polygon, a click or a box")
         return self
 
 
@@ -72,7 +78,7 @@ class ManualSource:
         require(
             bool(options.mask),
             "mask_source='manual' needs masks: give mask_options=FILE, a TOML file of tables [[mask]], each with a key "
-            "and a polygon or a click",
+            "and a polygon, a click or a box",
         )
         keys = [entry.key for entry in options.mask]
         twice = sorted({key for key in keys if keys.count(key) > 1})
@@ -92,7 +98,7 @@ class ManualSource:
                 f"mask_options has no mask with key = {key!r}, and none with key = {ANY!r}; add one, or take others"
             )
         size = (view.camera.height, view.camera.width)
-        pixels = polygon_pixels(entry.polygon, size) if entry.polygon else reduced(_clicked(view, entry), size)
+        pixels = polygon_pixels(entry.polygon, size) if entry.polygon else reduced(_meant(view, entry), size)
         if not pixels.any():
             return None
         return TargetMask(pixels=pixels, target_id=command.target_id, source="manual", parameters={"key": entry.key})
@@ -106,9 +112,13 @@ def polygon_pixels(polygon: Sequence[Place], size: tuple[int, int]) -> Pixels:
     return reduced(np.asarray(image), size)
 
 
-def _clicked(view: MaskView, entry: Entry) -> Pixels:
-    """Return the pixels of a shot that a click means."""
+def _meant(view: MaskView, entry: Entry) -> Pixels:
+    """Return the pixels of a shot that a click or a box means."""
     shot: Shot = view.shot()
+    if entry.box is not None:
+        height, width = shot.size
+        left, upper, right, lower = entry.box
+        return object_by_colour(shot.picture, (left * width, upper * height, right * width, lower * height))
     points_w = shot.points_w()
     assert entry.click is not None  # by its kind
     row, column = (

@@ -102,7 +102,7 @@ def test_an_entry_of_its_own_comes_before_the_one_for_all(make, tmp_path):
             '[[mask]]\nkey = "a"\nclick = [0.5, 0.5]\n[[mask]]\nkey = "a"\nclick = [0.5, 0.5]',
             "two masks have the key a",
         ),
-        ('[[mask]]\nkey = "a"', "give a polygon or a click"),
+        ('[[mask]]\nkey = "a"', "give a polygon, a click or a box"),
         ('[[mask]]\nkey = "a"\nclick = [0.5, 1.5]', r"mask\.0\.click\.1"),
         ('[[mask]]\nkey = "a"\nclick = [0.5, nan]', r"mask\.0\.click\.1"),
         ('[[mask]]\nkey = "a"\npolygon = [[0, 0], [1, 1]]', r"mask\.0\.polygon"),
@@ -193,6 +193,22 @@ def test_a_scene_that_was_dug_looks_as_at_first_when_it_is_shown_again():
     assert np.array_equal(env.shot().depth_m, depth_m)
     assert np.array_equal(env.mask.pixels, first)
     env.close()
+
+
+def test_a_box_marks_the_object_that_fills_it(tmp_path):
+    env = FR5GraspEnv(render_mode=None, scene_set="val")
+    env.reset(options=START)
+    rows, columns = np.nonzero(env.mask.pixels)
+    box = (columns.min() - 2) / 128, (rows.min() - 2) / 96, (columns.max() + 3) / 128, (rows.max() + 3) / 96
+    boxed = FR5GraspEnv(
+        render_mode=None,
+        scene_set="val",
+        **options(tmp_path, f'[[mask]]\nkey = "*"\nbox = {[float(b) for b in box]}\n'),
+    )
+    boxed.reset(options=START)
+    assert iou(boxed.mask.pixels, env.mask.pixels) > 0.7
+    for each in (env, boxed):
+        each.close()
 
 
 def test_a_click_that_hits_nothing_is_an_error(make, tmp_path):
