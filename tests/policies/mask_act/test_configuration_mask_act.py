@@ -26,7 +26,7 @@ def test_default_is_the_paper_network_and_needs_no_download():
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_fills_every_field_that_is_left_open(name):
     config = MaskACTConfig(preset=name, device="cpu")
-    optional = {"main_camera", "temporal_ensemble_coeff", "pretrained_backbone_weights"}
+    optional = {"main_camera", "temporal_ensemble_coeff", "pretrained_backbone_weights", "crop", "resize_to"}
     own = {f.name for f in fields(MaskACTConfig)} - {f.name for f in fields(PreTrainedConfig)}
     assert {f for f in own if getattr(config, f) is None} <= optional
     assert {f: getattr(config, f) for f in PRESETS[name]} == PRESETS[name]
