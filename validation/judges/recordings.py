@@ -11,7 +11,7 @@ from pathlib import Path
 from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
 EXCAV = (sys.executable, "-c", "import sys; from lerobot_excav.scripts.main import main; sys.exit(main(sys.argv[1:]))")
-EPISODES, SCENES, SECONDS = 4, 1, 6
+EPISODES, SCENES, SECONDS = 4, 1, 11
 
 
 def by_script(env_type: str, storage: str, out: Path) -> None:
@@ -47,15 +47,20 @@ def on_the_page(env_type: str, out: Path) -> None:
         page = SocketPage(console.address, drives=True)
         fps = page.state["fps"]
 
-        def sticks(frame: int) -> list[float]:
-            # Out of the dead zone from the first moment on, for time stands still until somebody moves.
-            return [0.5 * math.sin(0.3 + 2.0 * math.pi * frame / fps / period_s) for period_s in (4.0, 5.0, 3.0, 6.0)]
-
-        for _ in range(EPISODES):
-            page.record(sticks, frames=SECONDS * fps)
+        for episode in range(EPISODES):
+            page.record(partial(_sticks, episode=episode, fps=fps), frames=SECONDS * fps)
         page.wish("complete")
         page.wait(lambda state: state["recording"]["complete"])
         page.close()
+
+
+def _sticks(frame: int, *, episode: int, fps: int) -> list[float]:
+    """Return where sticks are that go to and fro, another way in every episode.
+
+    They are out of the dead zone from the first moment on, for time stands still until somebody moves.
+    """
+    phase = 0.3 + 0.7 * episode
+    return [0.5 * math.sin(phase + 2.0 * math.pi * frame / fps / period_s) for period_s in (4.0, 5.0, 3.0, 6.0)]
 
 
 RECORDINGS: dict[str, Callable[[Path], None]] = {
