@@ -64,12 +64,20 @@ class DatasetCard:
             private: Whether only its owner sees it; None leaves it to the Hub.
 
         Raises:
-            OSError: The Hub is not reached, or refuses.
+            DatasetError: The Hub is not reached, or refuses.
         """
+        from httpx import HTTPError
         from lerobot.datasets import LeRobotDataset
 
         dataset = LeRobotDataset(repo_id, root=root)
-        dataset.push_to_hub(tags=self.tags, license=self.license, private=private, dataset_description=self.description)
+        try:
+            dataset.push_to_hub(
+                tags=self.tags, license=self.license, private=private, dataset_description=self.description
+            )
+        except HTTPError as error:
+            raise DatasetError(
+                f"{repo_id} cannot be uploaded: {error}; log in with hf auth login, and give the same command again"
+            ) from error
 
 
 def write_card(
