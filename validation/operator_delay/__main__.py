@@ -21,8 +21,7 @@ from typing import Any
 from tqdm import tqdm
 
 from lerobot_excav.datasets.record.workers import worker_pool
-from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from lerobot_excav.whole_file import write_whole
+from validation.finished_plays import read_finished
 from validation.operator_delay.drive import Condition, drive
 from validation.operator_delay.page import write_page
 
@@ -55,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     conditions = [Condition(rate_hz=rate, delay_ms=delay) for rate in given.rates for delay in given.delays]
     wanted = [(condition, scoop) for scoop in range(given.scoops) for condition in conditions]
     given.file.parent.mkdir(parents=True, exist_ok=True)
-    done = {_key(line) for line in read_scoops(given.file)}
+    done = {_key(line) for line in read_finished(given.file)}
     missing = [(c, s) for c, s in wanted if (c.rate_hz, c.delay_ms, s) not in done]
     with worker_pool(given.workers) as pool, given.file.open("a", encoding="utf-8") as file:
         jobs = [
@@ -66,19 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file.write(json.dumps(job.result()) + "\n")
             file.flush()
     keys = {(c.rate_hz, c.delay_ms, s) for c, s in wanted}
-    write_page([line for line in read_scoops(given.file) if _key(line) in keys], given.page)
+    write_page([line for line in read_finished(given.file) if _key(line) in keys], given.page)
     print(f"written: {given.page}")
     return 0
-
-
-def read_scoops(path: Path) -> list[dict[str, Any]]:
-    """Return the finished scoops of the present simulation, of a file that may not exist yet."""
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    if lines and not lines[-1].endswith("\n"):  # an interruption cut it short: that scoop is played again
-        write_whole(path, "".join(lines[:-1]))
-        lines.pop()
-    scoops = [json.loads(line) for line in lines]
-    return [scoop for scoop in scoops if scoop["simulation_version"] == SCOOP.simulation_version]
 
 
 def _key(scoop: dict[str, Any]) -> tuple[int, int, int]:

@@ -22,7 +22,7 @@ from typing import Any
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.statistics import wilson_interval
-from lerobot_excav.whole_file import write_whole
+from validation.finished_plays import read_finished
 from validation.page_operator.pad import STUBBED_PAD, Plan, planned
 from validation.page_operator.socket_page import ConsoleProcess, SocketPage
 
@@ -75,11 +75,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--scenes={given.scenes}; allowed: 1 and above")
     wanted = [(scene, target) for scene in range(given.scenes) for target in range(SCOOP.target_count)]
     given.file.parent.mkdir(parents=True, exist_ok=True)
-    done = {(cycle["scene_id"], cycle["target_id"]) for cycle in read_cycles(given.file)}
+    done = {(cycle["scene_id"], cycle["target_id"]) for cycle in read_finished(given.file)}
     missing = [pair for pair in wanted if pair not in done]
     if missing:
         _play_all(missing, given.file)
-    cycles = [cycle for cycle in read_cycles(given.file) if (cycle["scene_id"], cycle["target_id"]) in wanted]
+    cycles = [cycle for cycle in read_finished(given.file) if (cycle["scene_id"], cycle["target_id"]) in wanted]
     print("\n".join(summary(cycles)))
     return 0
 
@@ -103,16 +103,6 @@ def _play_all(missing: list[tuple[int, int]], path: Path) -> None:
                 file.write(json.dumps(cycle) + "\n")
             words = "success" if cycle["is_success"] else "failed"
             print(f"scene {scene_id}, target {target_id}: {words}; {cycle['delay']}", flush=True)
-
-
-def read_cycles(path: Path) -> list[dict[str, Any]]:
-    """Return the finished cycles of the present simulation, of a file that may not exist yet."""
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    if lines and not lines[-1].endswith("\n"):  # an interruption cut it short: that cycle is played again
-        write_whole(path, "".join(lines[:-1]))
-        lines.pop()
-    cycles = [json.loads(line) for line in lines]
-    return [cycle for cycle in cycles if cycle["simulation_version"] == SCOOP.simulation_version]
 
 
 def summary(cycles: Sequence[dict[str, Any]]) -> list[str]:

@@ -87,5 +87,5 @@ def test_a_line_that_an_interruption_cut_short_is_dropped(tmp_path):
     whole, torn = json.dumps(scoop(10, 0, 0)) + "\n", json.dumps(scoop(10, 0, 1))[:50]
     path = tmp_path / "scoops.jsonl"
     path.write_text(whole + torn)
-    assert [found["scene_id"] for found in command.read_scoops(path)] == [0]
+    assert [found["scene_id"] for found in command.read_finished(path)] == [0]
     assert path.read_text() == whole

@@ -3,7 +3,8 @@
 import json
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from validation.page_operator.__main__ import read_cycles, summary
+from validation.finished_plays import read_finished
+from validation.page_operator.__main__ import summary
 
 
 def cycle(scene_id, *, is_success, **changes):
@@ -14,15 +15,15 @@ def cycle(scene_id, *, is_success, **changes):
 def test_a_line_that_was_cut_short_is_played_again(tmp_path):
     path = tmp_path / "cycles.jsonl"
     path.write_text(json.dumps(cycle(0, is_success=True)) + "\n" + json.dumps(cycle(1, is_success=True))[:20])
-    assert [each["scene_id"] for each in read_cycles(path)] == [0]
+    assert [each["scene_id"] for each in read_finished(path)] == [0]
     assert path.read_text().endswith("}\n")
-    assert read_cycles(tmp_path / "none.jsonl") == []
+    assert read_finished(tmp_path / "none.jsonl") == []
 
 
 def test_cycles_of_another_version_do_not_count(tmp_path):
     path = tmp_path / "cycles.jsonl"
     path.write_text(json.dumps(cycle(0, is_success=True, simulation_version=1)) + "\n")
-    assert read_cycles(path) == []
+    assert read_finished(path) == []
 
 
 def test_the_summary_names_what_the_page_lost():
