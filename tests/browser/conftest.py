@@ -10,6 +10,7 @@ import pytest
 
 from lerobot_excav.console import opening
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.page import sticks
 from lerobot_excav.page.access import Access, free_port
 from validation.page_operator.pad import STUBBED_PAD
 
@@ -27,12 +28,20 @@ def browser():
     if path is None:
         assert os.environ.get("EXCAV_BROWSER_TESTS") != "required", f"none of {', '.join(NAMES)} is installed"
         pytest.skip(f"none of {', '.join(NAMES)} is installed; on Debian: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
+
+    expect.set_options(timeout=20_000)  # two cores with other tests on them
 
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield launched
         launched.close()
+
+
+@pytest.fixture
+def patience(monkeypatch):
+    """Let a machine that is busy with other tests be silent for long: the page counts as heard all the same."""
+    monkeypatch.setattr(sticks, "LOST_S", 30.0)
 
 
 @pytest.fixture

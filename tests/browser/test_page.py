@@ -104,7 +104,7 @@ def test_a_click_and_a_painted_region_are_commanded(open_page):
         assert overlay.bounding_box() == box  # the picture does not jump when the page says something
 
 
-def test_a_policy_works_keys_take_over_it_is_handed_back_and_stopped(open_page, monkeypatch, tmp_path):
+def test_a_policy_works_keys_take_over_it_is_handed_back_and_stopped(open_page, patience, monkeypatch, tmp_path):
     monkeypatch.setattr(opening, "_policy", lambda *_: Planted())
     with serving(policy=tmp_path) as served:
         page = open_page(served)
@@ -132,16 +132,17 @@ def drive_left(page, served):
     until(lambda: state_of(served)["action"]["swing.vel"] == -0.0 + 1.0)
 
 
-def test_a_pad_that_is_lost_lets_go_and_has_to_be_centred_when_it_is_back(open_page):
+@pytest.mark.parametrize("away_s", [0.0, 1.0])
+def test_a_pad_that_is_lost_lets_go_and_has_to_be_centred_when_it_is_back(open_page, away_s):
     with serving() as served:
         page = open_page(served, pad=True)
         drive_left(page, served)
         page.evaluate("window.kept = window.pads; window.pads = [];")
-        until(lambda: not state_of(served)["ready"])
+        until(lambda: state_of(served)["axes"]["left_x"] == 0.0)
+        time.sleep(away_s)
         page.evaluate("window.axes = [-1, 0, 0, 0]; window.pads = window.kept;")
-        time.sleep(0.5)
-        frame = state_of(served)["frame"]
         expect(page.locator("#words")).to_contain_text("let go of the sticks")
+        frame = state_of(served)["frame"]
         time.sleep(0.5)
         assert state_of(served)["frame"] == frame
         page.evaluate("window.axes = [0, 0, 0, 0]")
@@ -157,7 +158,9 @@ def test_a_page_that_is_hidden_lets_go(open_page):
         assert state_of(served)["axes"]["left_x"] == 0.0
 
 
-def test_a_tab_that_is_closed_stops_the_machine_and_another_one_can_take_over(open_page, monkeypatch, tmp_path):
+def test_a_tab_that_is_closed_stops_the_machine_and_another_one_can_take_over(
+    open_page, patience, monkeypatch, tmp_path
+):
     monkeypatch.setattr(opening, "_policy", lambda *_: Planted())
     with serving(policy=tmp_path) as served:
         first, second = open_page(served), open_page(served)

@@ -207,6 +207,7 @@ POLICY = {
     "crop": optional(sizes(2, 2)),
     "resize_to": optional(sizes(0, 2)),
     "augment_shift_px": whole(0, 1024),
+    "augment_mask_px": whole(0, 1024),
     "compare_masks": flag,
     "mask_key": feature_name,
     "main_camera": optional(feature_name),
@@ -293,6 +294,7 @@ SCENES = {
     "scenes": whole(1, 100_000),
     "targets": optional(whole(1, 4)),
     "target_rule": one_of("round", "uniform", "nearest").beside(targets=1),
+    "retarget": number(0.0, 1.0),
     "seed": whole(0, SEED),
 }
 GOOD_STAGES = ("0", "19", "0,4,8", "8, 0", "0,1-13", "3-3")

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toy_reach.table import SPEED_M_S
+
 
 class ReachOperator:
     """Slides to the commanded spot, also when the command changes.
@@ -17,7 +19,14 @@ class ReachOperator:
         self._pace = rng.uniform(0.6, 1.0)
 
     def reset(self, env: Any) -> None:
-        """Do nothing: it looks at the table before every action."""
+        """Look how far it is; where the spots are it looks up before every action."""
+        way = env.world.spots_w[env.target_id] - env.world.pos_w
+        self._approach_s = float(np.abs(way).max()) / (self._pace * SPEED_M_S)
+
+    @property
+    def approach_s(self) -> float:
+        """How long after `reset` it means to touch what it was told to act on [s]."""
+        return self._approach_s
 
     def act(self, env: Any) -> NDArray[np.float32]:
         """Return the next velocity, (2,)."""

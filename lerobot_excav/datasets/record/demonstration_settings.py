@@ -46,7 +46,16 @@ class PlayedScenes:
         default="round",
         choices=TARGET_RULES,
     )
-    seed: int = setting("Seed of the operator's variations and of drawn targets", default=0, low=0, high=2**63 - 1)
+    retarget: float = setting(
+        "Share of the episodes with a change of mind: another target is commanded at a moment drawn from those before "
+        "the operator would touch the first",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+    )
+    seed: int = setting(
+        "Seed of the operator's variations, of drawn targets and of changes of mind", default=0, low=0, high=2**63 - 1
+    )
 
     def __post_init__(self) -> None:
         check_settings(self, self.PREFIX)
@@ -73,6 +82,11 @@ class PlayedScenes:
         require(
             self.episode_length <= MOST_FRAMES,
             f"--env.episode_length={self.episode_length} is too long to be kept; give a number up to {MOST_FRAMES}",
+        )
+        require(
+            self.retarget == 0.0 or (spec.default_target is None and getattr(self.env, "retarget_frame", None) is None),
+            f"--retarget={self.retarget} has no meaning for {spec.id} with these settings: the task itself says when "
+            "the command changes; leave it out",
         )
         for name in spec.settings.columns():
             value = getattr(self.env, name)

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
+from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Schedule
 from lerobot_excav.envs.tasks.task import Operator
@@ -115,9 +117,12 @@ class EpisodeTape:
         )
 
 
-def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) -> Episode:
+def demonstrate(
+    env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair, change: ChangeOfMind | None = None
+) -> Episode:
     """Reset an environment to a pair's start and target, then the operator, and let it play to the end.
 
+    With a change of mind another target is commanded on the way to the first.
     Where the task says so, the last frames, in which the operator rests, are played but not returned.
     """
     rests: list[bool] = []
@@ -127,7 +132,15 @@ def demonstrate(env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair) ->
         rests.append(env.task_spec.cuts_rest and bool(operator.done))  # type: ignore[attr-defined]  # see Operator
         return action
 
-    episode = _play(env, pair, dict(pair.reset_options), reset=lambda: operator.reset(env), act=act)
+    def reset() -> None:
+        operator.reset(env)
+        if change is not None:
+            change.begin(env, operator)
+
+    def changed() -> Seen | None:
+        return None if change is None else change.pass_frame(env)
+
+    episode = _play(env, pair, dict(pair.reset_options), reset=reset, act=act, changed=changed)
     at_work = [frame for frame, is_rest in enumerate(rests) if not is_rest]
     return _without_rest(episode, 1 + max(at_work, default=0))
 
@@ -166,14 +179,16 @@ def _play(
     *,
     reset: Callable[[], None],
     act: Callable[[int], NDArray[Any]],
+    changed: Callable[[], Seen | None] = lambda: None,
     least: int = 0,
     most: float = math.inf,
 ) -> Episode:
-    """Play until the episode ends, but at least and at most so many frames."""
+    """Play until the episode ends, but at least and at most so many frames; `changed` may give a new command."""
     observation, info = env.reset(options=options)
     reset()
     tape, ended = EpisodeTape(), False
     while tape.length < least or (tape.length < most and not ended):
+        observation, info = changed() or (observation, info)
         action = np.asarray(act(tape.length), dtype=np.float32)
         tape.add(observation, info, action)
         observation, _, terminated, truncated, info = env.step(action)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
+from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.episode import Episode, demonstrate, replay
 from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
@@ -72,8 +73,9 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
     The environment stays open for the next call with the same settings. Without pictures it is several times faster.
     """
     env = open_environment(played.env, with_images=with_images)
-    operator = played.task_spec.make_operator(np.random.default_rng(played.episode_seed(pair)))
-    return demonstrate(env, operator, pair)
+    seed = played.episode_seed(pair)
+    operator = played.task_spec.make_operator(np.random.default_rng(seed))
+    return demonstrate(env, operator, pair, ChangeOfMind.drawn(played.retarget, seed))
 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:

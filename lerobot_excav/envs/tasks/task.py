@@ -25,6 +25,10 @@ what the pictures would show, as numbers: for reinforcement learning."""
 class Operator(Protocol):
     """A scripted operator of a task; with `cuts_rest` it also has `done`: whether the work is over and it rests."""
 
+    @property
+    def approach_s(self) -> float:
+        """How long after `reset` it will be on its way, before it touches what it is to act on [s]."""
+
     def reset(self, env: Any) -> None:
         """Look at a freshly reset environment of the task."""
 

@@ -12,7 +12,7 @@ export class Sticks {
     this.keys = new Set();
     this.screen = [0, 0, 0, 0];
     this.pads = [];        // ids of the pads in use
-    this.isLost = false;   // whether one of them is gone
+    this.isLost = false;   // whether one of them is gone, or new
     this.usesPads = true;
     addEventListener("blur", () => this.release());
     document.addEventListener("visibilitychange", () => document.hidden && this.release());
@@ -48,7 +48,8 @@ export class Sticks {
     const whole = pads.find((pad) => pad.mapping === "standard" && pad.axes.length >= 4);
     const used = whole ? [whole] : pads.slice(0, 2);
     const ids = used.map((pad) => `${pad.index}:${pad.id}`);
-    if (this.usesPads && this.pads.some((id) => !ids.includes(id))) this.isLost = true;
+    // A pad that comes back may be held over, so it has to be centred as one that is lost.
+    if (this.usesPads && ids.join() !== this.pads.join()) this.isLost = true;
     this.pads = ids;
     this.names = used.map((pad) => pad.id.split("(")[0].trim());
     // Buttons of other devices have no names: a trigger is no wish.
@@ -57,7 +58,7 @@ export class Sticks {
     return AXES.map((_, i) => Math.max(-1, Math.min(1, values[i] ?? 0)));
   }
 
-  /* Tell once that a pad that was in use is gone. */
+  /* Tell once that the pads in use are others than before: one is gone, or one has come. */
   takeLost() {
     const lost = this.isLost;
     this.isLost = false;

@@ -89,6 +89,14 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         high=1024,
         hint="0 leaves pictures where they are.",
     )
+    augment_mask_px: int = setting(
+        "In training, move the mask alone by up to this much along each axis, drawn for each sample: the policy learns "
+        "to forgive masks that lie beside their target [px]",
+        default=0,
+        low=0,
+        high=1024,
+        hint="0 leaves masks where they are.",
+    )
     compare_masks: bool = setting(
         "In training, compare masks with the stored frames; turn it off only if a processor of your own moves pictures "
         "and masks together",
@@ -323,11 +331,13 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 "--policy.input_features.",
             )
         main_shape = tuple(self.image_features[self.main_camera_key].shape)
-        require(
-            self.augment_shift_px < min(main_shape[1:]),
-            f"policy.augment_shift_px={self.augment_shift_px} would move {self.main_camera_key} of shape {main_shape} "
-            f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
-        )
+        for name in ("augment_shift_px", "augment_mask_px"):
+            value = getattr(self, name)
+            require(
+                value < min(main_shape[1:]),
+                f"policy.{name}={value} would move {self.main_camera_key} of shape {main_shape} "
+                f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
+            )
         require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:

@@ -13,8 +13,10 @@ from torch import Tensor
 
 from lerobot_excav.errors import require_choice
 from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights, require_processors
+from lerobot_excav.policies.mask_act.command_changes import CommandChanges
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.framing import framed
+from lerobot_excav.policies.mask_act.mask_shift import shift_alone
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
@@ -34,7 +36,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     | `observation.state` | normalised robot state, (B, S), if the policy has one |
     | `observation.environment_state` | normalised environment state, (B, E), if the policy has one |
     | `action`, `action_is_pad` | training only: (B, chunk_size, A), (B, chunk_size) |
-    | `index`, `episode_index` | training only: (B,), the frames that the masks are compared with |
+    | `index`, `episode_index` | training only: (B,), the frames whose masks and commands are looked up |
 
     Actions are float32, also where `use_amp` computes them in fewer bits.
 
@@ -59,6 +61,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         if meta is not None:
             require_statistics(config, meta)
         self._training_masks = TrainingMasks(config, meta)
+        self._command_changes = CommandChanges(meta)
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
         # LeRobot's `drop_queued_actions` clears what has this name.
@@ -119,7 +122,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
                 one that the dataset holds.
         """
         require_choice("reduction", reduction, ("mean", "none"))
-        demonstration = Demonstration(batch[ACTION], batch["action_is_pad"])
+        demonstration = Demonstration(batch[ACTION], self._command_changes.is_pad(batch))
         mask = target_mask(self.config, batch, is_training=True)
         if self.training:
             self._training_masks.check(batch, mask)
@@ -172,11 +175,13 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
     def _augmented(self, batch: Batch, mask: Tensor) -> tuple[Batch, Tensor]:
         """Return batch and mask for one training step, by the `augment_...` settings."""
-        if not self.config.augment_shift_px:
-            return batch, mask
-        main = self.config.main_camera_key
-        picture, mask = shift_together(batch[main], mask, self.config.augment_shift_px)
-        return {**batch, main: picture}, mask
+        if shift_px := self.config.augment_shift_px:
+            main = self.config.main_camera_key
+            picture, mask = shift_together(batch[main], mask, shift_px)
+            batch = {**batch, main: picture}
+        if mask_px := self.config.augment_mask_px:
+            mask = shift_alone(mask, mask_px)
+        return batch, mask
 
     def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
         config = self.config

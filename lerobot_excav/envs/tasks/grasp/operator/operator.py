@@ -31,6 +31,11 @@ class GraspOperator:
         self._plan = plan_grasp(start_pos_w, cell.block_pos_w[self._target_id], variation)
         self._ticks = 0
 
+    @property
+    def approach_s(self) -> float:
+        """How long after `reset` the fingers begin to close [s]."""
+        return self._plan.grip_s
+
     def act(self, env: FR5GraspEnv) -> NDArray[np.float32]:
         """Return the action of the next frame: joint position targets [rad] and opening [0..1], (7,) float32."""
         if env.target_id != self._target_id:

@@ -62,6 +62,11 @@ class Plan:
         """Time of the last way-point [s]."""
         return self._way_points[-1].time_s
 
+    @property
+    def grip_s(self) -> float:
+        """Time at which the fingers begin to close [s]."""
+        return self._way_points[PHASES.index("grip")].time_s  # the first way-point is the start
+
     def at(self, time_s: float) -> Command:
         """Return what is asked for at a time since the start [s].
 

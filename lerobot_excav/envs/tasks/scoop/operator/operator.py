@@ -44,6 +44,12 @@ class DigOperator:
         self._cycle, self._target_id = env.cycle, env.cycle.target_id
         self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
         self._begin(0, env)
+        self._approach_s = self._motion.duration_s - self._time_s  # the pause before it counts
+
+    @property
+    def approach_s(self) -> float:
+        """How long after `reset` the cutting edge is to be where the cut begins [s]."""
+        return self._approach_s
 
     @property
     def phase(self) -> str:

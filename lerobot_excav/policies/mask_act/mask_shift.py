@@ -1,0 +1,31 @@
+"""Augmentation that moves a mask alone: the error of whoever points."""
+
+import torch
+from torch import Tensor
+
+from lerobot_excav.policies.mask_act.picture_shift import is_in
+
+
+def shift_alone(mask: Tensor, shift_px: int) -> Tensor:
+    """Move every mask by a whole number of pixels, drawn for each sample and axis; its picture stays.
+
+    A mask that would leave the picture whole stays where it is: nothing would say where to act. The draw comes from
+    PyTorch's global generator on the CPU, which `lerobot-train --seed` sets.
+
+    Args:
+        mask: Masks, shape (B, 1, H, W).
+        shift_px: Greatest shift along each axis; all shifts from -shift_px to shift_px are equally likely.
+
+    Returns:
+        Moved masks, a new tensor.
+    """
+    size, _, height, width = mask.shape
+    down, right = torch.randint(-shift_px, shift_px + 1, (2, size, 1)).to(mask.device)
+    rows = torch.arange(height, device=mask.device) - down  # (B, H): where each row comes from
+    columns = torch.arange(width, device=mask.device) - right
+    sample = torch.arange(size, device=mask.device)[:, None, None]
+    source = (rows.clamp(0, height - 1)[:, :, None], columns.clamp(0, width - 1)[:, None, :])
+    was_inside = is_in(rows, height)[:, :, None] & is_in(columns, width)[:, None, :]
+    moved = (mask[sample, 0, *source] * was_inside)[:, None]
+    is_left = moved.flatten(1).any(dim=1)[:, None, None, None]
+    return torch.where(is_left, moved, mask)

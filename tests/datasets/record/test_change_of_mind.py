@@ -1,0 +1,104 @@
+"""Changes of mind in demonstrations: another target is commanded on the way to the first."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from lerobot_excav.datasets.check.quality_check import check_dataset
+from lerobot_excav.datasets.pairs.paired_index import build_index
+from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
+from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
+from lerobot_excav.datasets.record.demonstrations import record_demonstrations
+from lerobot_excav.datasets.record.episode import demonstrate
+from lerobot_excav.datasets.record.simulation import make_environment, play_demonstration
+from lerobot_excav.envs.masks.source import MaskMissingError
+from lerobot_excav.errors import ConfigurationError
+
+SMALL = {"observation_height": 32, "observation_width": 48}
+TASKS = {"toy_reach": SMALL, "fr5_grasp": SMALL, "excavator": {"fidelity": "fast", **SMALL}}
+
+
+def settings_of(env_type, **changes):
+    return DemonstrationSettings.of(env_type, TASKS[env_type], **{"scenes": 2, "retarget": 1.0, **changes})
+
+
+def commands(episode):
+    return sorted({(int(f), int(t)) for f, t in zip(episode.command_frame, episode.target_id, strict=True)})
+
+
+@pytest.mark.parametrize("env_type", [pytest.param(name, marks=pytest.mark.slow) for name in TASKS])
+def test_the_operator_obeys_the_second_command_and_succeeds(env_type):
+    settings = settings_of(env_type)
+    first_frames = set()
+    for pair in settings.pairs()[::3]:
+        episode = play_demonstration(settings, pair, with_images=False)
+        (start, first), (changed, second) = commands(episode)
+        assert (start, first) == (0, pair.target_id)
+        assert second != first
+        assert episode.success, pair
+        assert episode.metrics["commands"] == [[0, first], [changed, second]]
+        first_frames.add(changed)
+    assert len(first_frames) > 1  # drawn for every episode
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("env_type", "name", "below"), [("fr5_grasp", "fingers_on_target", 2.0), ("excavator", "excavated_mass_kg", 1.0)]
+)
+def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below):
+    settings = settings_of(env_type)
+    column = settings.task_spec.task_state_names.index(name)
+    for pair in settings.pairs()[1:4]:
+        episode = play_demonstration(settings, pair, with_images=False)
+        changed = int(episode.command_frame[-1])
+        assert episode.task_state[: changed + 1, column].max() < below
+
+
+def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as_they_were():
+    drawn = [ChangeOfMind.drawn(0.3, (7, scene, 0)) is not None for scene in range(1000)]
+    assert 0.25 < np.mean(drawn) < 0.35
+    assert ChangeOfMind.drawn(0.0, (7, 0, 0)) is None
+    without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
+    same = [
+        np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
+        for pair in without.pairs()
+    ]
+    assert 0 < sum(same) < len(same)
+
+
+def test_a_dataset_counts_the_commands_and_passes_its_check_by_replaying_them(tmp_path):
+    out = tmp_path / "dataset"
+    settings = settings_of("toy_reach", retarget=0.5)
+    record_demonstrations(settings, out, workers=0, show_progress=False)
+    index = build_index(out)
+    assert set(index["commands"]) == {1, 2}
+    changed = index[index["commands"] == 2]
+    assert (changed["final_target_id"] != changed["target_id"]).all()
+    report = check_dataset(out, replays=len(index))
+    assert report.problems == []
+    assert report.episodes["replayed"].all()
+    assert set(report.episodes["qc_problem"]) == {""}
+
+
+def test_a_target_that_the_mask_source_does_not_find_leaves_the_command_as_it_was(monkeypatch):
+    settings = settings_of("toy_reach")
+    pair = settings.pairs()[0]
+    with closing(make_environment(settings.env, with_images=False)) as env:
+
+        def refuse(target_id):
+            raise MaskMissingError(f"target {target_id} is not found")
+
+        monkeypatch.setattr(env, "recommand", refuse)
+        operator = settings.task_spec.make_operator(np.random.default_rng(0))
+        episode = demonstrate(env, operator, pair, ChangeOfMind.drawn(1.0, (0,)))
+    assert commands(episode) == [(0, pair.target_id)]
+    assert episode.success
+
+
+@pytest.mark.parametrize(
+    ("env_type", "env"), [("excavator", {"task": "Clear-v0"}), ("fr5_grasp", {"retarget_frame": 25})]
+)
+def test_where_the_task_itself_changes_the_command_it_is_refused(env_type, env):
+    with pytest.raises(ConfigurationError, match=r"--retarget=0\.5 has no meaning for .*; leave it out"):
+        DemonstrationSettings.of(env_type, env, retarget=0.5)
