@@ -39,6 +39,8 @@ INVENTED_FILES = {
     "sam.toml",
     "vlm.toml",
     "drawn.toml",
+    "live.toml",
+    "clicks.toml",
     "config_toy_reach_sim.py",
     "toy_reach_sim.py",
 }

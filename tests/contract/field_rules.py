@@ -233,6 +233,7 @@ EXCAVATOR = {
     **TASK,
     **{"task": one_of("Scoop-v0", "Clear-v0"), "soil": SOIL, "fidelity": one_of("fast", "standard", "fine")},
     "keep_out": Rule(lambda v: isinstance(v, str) and v in ZONES, (*ZONES, *NO_ZONES)).beside(task="Clear-v0"),
+    "retarget_frame": optional(whole(1, 199)),  # of 200 frames
 }
 FR5 = {**TASK, "task": one_of("FR5Grasp-v0"), "retarget_frame": optional(whole(1, 399))}  # of 400 frames
 DERIVED = ("features", "features_map")  # from the other fields, whatever is given
@@ -405,7 +406,7 @@ CONFIGURATIONS = {
         {},
     ),
     "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV | {"render_camera": one_of("overview", "main", "top")}, {}),
-    "excavator_sim": (ExcavatorSimConfig, EXCAVATOR | ROBOT, {}),
+    "excavator_sim": (ExcavatorSimConfig, EXCAVATOR | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS))}, {}),
     "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS)), "stage": whole(0, 0)}, {}),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),
     "excavator_operator": (ExcavatorOperatorConfig, {"seed": whole(0)}, {}),

@@ -8,6 +8,9 @@ from lerobot.cameras import CameraConfig
 from lerobot_excav.envs.masks.source import chooses_target, mask_source_names
 from lerobot_excav.errors import require, require_choice
 
+ANY_FPS = 30
+"""Rate that is told [1/s] (kind: guess): LeRobot's robots demand one of every camera, and a mask is read at any."""
+
 
 @CameraConfig.register_subclass("mask")
 @dataclass(kw_only=True)
@@ -32,6 +35,8 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
     command: Path | None = None
 
     def __post_init__(self) -> None:
+        if self.fps is None:
+            self.fps = ANY_FPS
         require_choice("source of a mask camera", self.source, mask_source_names())
         require(
             not chooses_target(self.source), f"source={self.source} of a mask camera chooses where to act by itself"

@@ -48,6 +48,18 @@ class PinholeCamera:
     height: int
     width: int
 
+    def pixel(self, point_w: NDArray[np.float64]) -> tuple[float, float] | None:
+        """Return row and column at which a world point (3,) [m] is seen, pixel centres being whole numbers.
+
+        None stands for a point behind the camera; others may lie beside the picture.
+        """
+        right, up, backward = (point_w - self.position_w) @ self.axes_w
+        if backward >= 0.0:
+            return None
+        focal_px = 0.5 * self.height / np.tan(0.5 * self.fovy_rad)
+        row, column = 0.5 * self.height + focal_px * up / backward, 0.5 * self.width - focal_px * right / backward
+        return float(row) - 0.5, float(column) - 0.5
+
     def points_w(self, depth_m: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the world points (H, W, 3) [m] behind the pixels, at distances (H, W) [m] along the optical axis."""
         focal_px = 0.5 * self.height / np.tan(0.5 * self.fovy_rad)

@@ -15,6 +15,7 @@ from lerobot_excav.envs.masks.geometry import GeometrySource
 from lerobot_excav.envs.masks.pointed import PointedSource
 from lerobot_excav.envs.masks.shot import ENLARGED, Shot
 from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask, chooses_target
+from lerobot_excav.envs.tasks.retarget import second_target
 from lerobot_excav.envs.tasks.selection import Selection
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -108,7 +109,9 @@ class CommandedEnv(WatchedEnv):
 
     def _next_target(self) -> int | None:
         """Return the target that the task commands from this frame on; None leaves the command as it is."""
-        return None
+        if self._frame != getattr(self.settings, "retarget_frame", None):
+            return None
+        return second_target(self.scene_key, self.target_id, self._target_count)
 
     def _begin_command(self, target_id: int) -> None:
         """Take note that another target is commanded."""

@@ -45,7 +45,7 @@ class CommandChanges:
         require(
             "index" in batch,
             f"the dataset holds changes of the command ({COMMAND_KEY}) and its batches have no column index, so "
-            "nothing says which actions belong to which; keep index in the batches, or train on episodes of one command",
+            "nothing says which actions belong to which; keep index in the batches, or train on one command an episode",
         )
         left = self._frames_left[batch["index"].flatten().cpu()].to(is_pad.device)[:, None]
         later = torch.arange(is_pad.shape[1], device=is_pad.device)[None] >= left

@@ -15,3 +15,4 @@ class ExcavatorSimConfig(ExcavatorSettings, SimulatedRobotConfig):
     """Set up the simulated excavator from LeRobot's command line; see both classes."""
 
     PREFIX: ClassVar[str] = "robot."
+    IS_ENDLESS: ClassVar[bool] = True

@@ -132,6 +132,8 @@ def test_command_line_and_saved_configuration_give_the_same(spec, tmp_path: Path
         ("fr5_grasp", {"retarget_frame": 400}, "env.retarget_frame=400 is not possible"),
         ("fr5_grasp", {"retarget_frame": 0}, "env.retarget_frame=0 is not possible"),
         ("fr5_grasp", {"retarget_frame": 20, "episode_length": 20}, "env.retarget_frame=20"),
+        ("excavator", {"retarget_frame": 200}, "env.retarget_frame=200 is not possible"),
+        ("excavator", {"retarget_frame": 5, "task": "Clear-v0"}, "env.retarget_frame=5 has no effect with env.task="),
         ("fr5_grasp", {"task": "Scoop-v0"}, "env.task='Scoop-v0'"),
     ],
 )

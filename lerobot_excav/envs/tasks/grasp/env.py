@@ -1,18 +1,16 @@
 """The FR5 arm among four blocks as a gymnasium environment."""
 
-from typing import Any, cast, override
+from typing import Any, override
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.fr5.layout import BLOCK_COUNT
 from lerobot_excav.envs.machines.fr5.rendering import WorkcellRenderer
 from lerobot_excav.envs.machines.fr5.viewing import WorkcellView
 from lerobot_excav.envs.machines.fr5.workcell import Workcell
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.grasp.scene import GraspScene, draw_scene
-from lerobot_excav.envs.tasks.grasp.settings import FR5Settings
 from lerobot_excav.envs.tasks.grasp.task import GraspTask
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Selection
@@ -20,8 +18,6 @@ from lerobot_excav.errors import require
 
 BLOCK_REACH_M = 0.05
 """From the middle of a block; what is farther away is no part of it [m] (derived: its half diagonal)."""
-
-_RETARGET_STREAM = 0x4E77  # names the random streams from which the second target is drawn
 
 
 class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
@@ -114,13 +110,6 @@ class FR5GraspEnv(MaskedTaskEnv[Workcell, WorkcellRenderer]):
 
     def _region(self, target_id: int) -> int:
         return target_id  # a block is what its index says
-
-    def _next_target(self) -> int | None:
-        if self._frame != cast(FR5Settings, self.settings).retarget_frame:
-            return None
-        key = (*self.scene_key, self.target_id)
-        rng = np.random.default_rng(np.random.SeedSequence(_RETARGET_STREAM, spawn_key=key))
-        return int(rng.choice([i for i in range(BLOCK_COUNT) if i != self.target_id]))
 
     def _begin_command(self, target_id: int) -> None:
         self.grasp.retarget(target_id)

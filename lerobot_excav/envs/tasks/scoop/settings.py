@@ -7,16 +7,21 @@ import lerobot_excav.envs.tasks.planner.vlm_source  # noqa: F401 - makes the sou
 from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones, zone_text
+from lerobot_excav.envs.tasks.retarget import RetargetSettings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
 from lerobot_excav.setting import setting, with_default
 
+CYCLE_DURATION_S = 20.0
+"""Time limit of a single cycle unless another is asked for [s] (kind: paper)."""
+
 
 @dataclass(kw_only=True)
-class ExcavatorSettings(TaskSettings):
+class ExcavatorSettings(RetargetSettings):
     """What a user may set about the excavator; see `TaskSettings`."""
 
     ENV_TYPE: ClassVar[str] = "excavator"
+    DURATION_S: ClassVar[float] = CYCLE_DURATION_S
 
     task: str = setting(
         "Task: Scoop-v0, a single cycle, or Clear-v0, a whole pile",
@@ -47,6 +52,12 @@ class ExcavatorSettings(TaskSettings):
             not zones or self.task != "Scoop-v0",
             f"{self.PREFIX}keep_out={self.keep_out!r} has no effect with {self.PREFIX}task='Scoop-v0', whose regions "
             "belong to the scene; leave it out, or give --env.task=Clear-v0",
+        )
+
+        require(
+            self.retarget_frame is None or self.task == "Scoop-v0",
+            f"{self.PREFIX}retarget_frame={self.retarget_frame} has no effect with {self.PREFIX}task={self.task!r}, "
+            "whose planner gives the commands; leave it out, or give --env.task=Scoop-v0",
         )
 
     @property

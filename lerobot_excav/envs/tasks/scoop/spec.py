@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, CAMERAS, STATE_NAMES, VIEWS
-from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
+from lerobot_excav.envs.tasks.scoop.settings import CYCLE_DURATION_S, ExcavatorSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
 
 CYCLE_LIMIT_S = 25.0
@@ -49,7 +49,7 @@ SCOOP = TaskSpec(
     action_high=(1.0,) * len(ACTION_NAMES),
     task_state_names=TASK_STATE_NAMES,
     environment_state_names=ENVIRONMENT_STATE_NAMES,
-    duration_s=20.0,  # kind: paper
+    duration_s=CYCLE_DURATION_S,
     storage="image",
     settings=ExcavatorSettings,
     simulation_version=5,

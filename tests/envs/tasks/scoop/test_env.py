@@ -206,3 +206,19 @@ def test_a_failure_is_told_as_soon_as_it_is_certain(env, hit, contacts, deposite
     env.cycle.target_hit = hit
     env.cycle.state.hard_target_contacts, env.cycle.state.deposited_mass_kg = contacts, deposited
     assert env.caption.outcome == failure
+
+
+@pytest.mark.slow
+def test_another_region_is_commanded_at_the_retarget_frame_and_the_operator_digs_it():
+    env = ExcavatorEnv(obs_type="agent_pos", fidelity="fast", retarget_frame=15)
+    second = {}
+    for scene_id, target_id in ((0, 0), (1, 2), (2, 3)):
+        env.reset(options={"scene_id": scene_id, "target_id": target_id})
+        _, is_over, info = operate(env)
+        (start, first), (frame, second[scene_id]) = info["episode_metrics"]["commands"]
+        assert (start, first, frame) == (0, target_id, 15)
+        assert second[scene_id] != target_id
+        assert is_over
+        assert info["is_success"]
+    env.reset(options={"scene_id": 1, "target_id": 2})
+    assert rollout(env, np.zeros(4), 15)[4]["target_id"] == second[1]  # whatever was done before
