@@ -67,10 +67,10 @@ table-excavator: $(READY) ## the excavator's table: data, trainings, evaluations
 	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/excavator/Snakefile --cores $(JOBS)
 
 test: $(READY) ## run the test suite
-	@OMP_NUM_THREADS=1 $(RUN)/python $(PYTEST)
+	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python $(PYTEST)
 
 test-lowest: $(LOWEST)/.ready ## test the simulators with the lowest versions that pyproject.toml allows (LOWEST_TESTS=tests for all)
-	@OMP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) $(LOWEST_TESTS)
+	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) $(LOWEST_TESTS)
 
 test-long: $(LOWEST)/.ready $(NEWEST)/.ready ## everything before an issue is called done: both ends of all versions, kills, fuzz (hours)
 	@OMP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) tests

@@ -8,6 +8,8 @@
 | robot | `excavator_sim` | `ExcavatorSimConfig` |
 | robot | `fr5_sim` | `FR5SimConfig` |
 | camera | `shared` | `SharedCameraConfig` |
+| camera | `stream` | `StreamCameraConfig` |
+| robot | `excavator_testbed` | `ExcavatorTestbedConfig` |
 | camera | `mask` | `MaskCameraConfig` |
 | teleoperator | `excavator_joystick` | `ExcavatorJoystickConfig` |
 | teleoperator | `excavator_keyboard` | `ExcavatorKeyboardConfig` |
@@ -22,11 +24,13 @@ so no simulator is loaded here.
 
 from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
 from lerobot_excav.cameras.shared_camera.config_shared_camera import SharedCameraConfig
+from lerobot_excav.cameras.stream_camera.config_stream_camera import StreamCameraConfig
 from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
 from lerobot_excav.envs.plugins import load_plugins
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
+from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_keyboard.config_excavator_keyboard import ExcavatorKeyboardConfig
@@ -41,6 +45,7 @@ __all__ = [
     "ExcavatorKeyboardConfig",
     "ExcavatorOperatorConfig",
     "ExcavatorSimConfig",
+    "ExcavatorTestbedConfig",
     "ExcavatorWebConfig",
     "FR5GraspEnvConfig",
     "FR5OperatorConfig",
@@ -49,6 +54,7 @@ __all__ = [
     "MaskACTConfig",
     "MaskCameraConfig",
     "SharedCameraConfig",
+    "StreamCameraConfig",
 ]
 
 # Tasks and mask sources of other packages, for the commands that find this one.

@@ -23,12 +23,12 @@ LAYERS = [
             "envs.tasks",
             "envs",
         ),
-        *("cameras", "page", "robots", "teleoperators", "datasets", "evaluation", "console", "scripts"),
+        *("testbed", "cameras", "page", "robots", "teleoperators", "datasets", "evaluation", "console", "scripts"),
     ],
     ["policies"],
 ]
 SHARED = {"errors", "run_lock", "setting", "whole_file"}
-DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks"]
+DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks", "clicks"]
 FREE = {"plugin", "scripts.export"}
 
 

@@ -18,7 +18,7 @@ from lerobot.teleoperators import TeleoperatorConfig
 
 import lerobot_excav.plugin  # noqa: F401
 from lerobot_excav.scripts.arguments import parse_arguments
-from lerobot_excav.scripts.main import COMMANDS
+from lerobot_excav.scripts.main import COMMANDS, module_of
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -118,7 +118,7 @@ def test_commands_can_be_parsed(name):
         elif words != ["--version"]:
             verb, *options = words
             assert verb in COMMANDS
-            kind = importlib.import_module(f"lerobot_excav.scripts.{verb}").ARGUMENTS
+            kind = module_of(verb).ARGUMENTS
             parse_arguments(kind, options, command=verb, description="")
 
 

@@ -96,10 +96,11 @@ def test_the_list_is_complete():
     excavator = {
         "excavator",
         "excavator_sim",
+        "excavator_testbed",
         "excavator_joystick",
         "excavator_operator",
         "excavator_web",
         "excavator_keyboard",
     }
-    arm, cameras = {"fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web"}, {"mask", "shared"}
+    arm, cameras = {"fr5_grasp", "fr5_sim", "fr5_operator", "fr5_web"}, {"mask", "shared", "stream"}
     assert registered == {*excavator, *arm, *cameras, "mask_act"}

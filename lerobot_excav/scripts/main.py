@@ -6,6 +6,7 @@ import io
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
+from types import ModuleType
 
 from lerobot_excav.errors import ExcavError
 from lerobot_excav.scripts.file_trouble import in_words
@@ -21,6 +22,7 @@ COMMANDS = {
     "report": "make the table of one or more evaluations, with intervals and comparisons",
     "audit": "ask whether a policy acts where its mask says because of the mask",
     "console": "open a page to see, point, drive, let a policy work, and record",
+    "testbed-emulator": "stand in for a real excavator: a simulated machine behind the test bed's wire",
     "export": "write a small copy of a trained policy, with a model card",
     "bench": "measure how fast this machine simulates and records",
     "warmup": "compile the simulation ahead of the first episode",
@@ -41,6 +43,11 @@ a first round:
 
 `lerobot-excav COMMAND --help` explains a command.
 """
+
+
+def module_of(command: str) -> ModuleType:
+    """Return the module of a command."""
+    return importlib.import_module(f"lerobot_excav.scripts.{command.replace('-', '_')}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from lerobot_excav.envs.plugins import load_plugins
     from lerobot_excav.scripts.arguments import parse_arguments
 
-    command = importlib.import_module(f"lerobot_excav.scripts.{name}")
+    command = module_of(name)
     try:
         load_plugins()
         parsed = parse_arguments(command.ARGUMENTS, rest, command=name, description=command.__doc__ or "")

@@ -5,7 +5,6 @@ field, and know nothing of the code that checks it.
 """
 
 import contextlib
-import importlib
 import math
 import signal
 from pathlib import Path
@@ -23,8 +22,9 @@ from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
+from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
 from lerobot_excav.robots.fr5_sim.config_fr5_sim import FR5SimConfig
-from lerobot_excav.scripts.main import COMMANDS
+from lerobot_excav.scripts.main import COMMANDS, module_of
 from lerobot_excav.teleoperators.excavator_joystick.config_excavator_joystick import ExcavatorJoystickConfig
 from lerobot_excav.teleoperators.excavator_keyboard.config_excavator_keyboard import ExcavatorKeyboardConfig
 from lerobot_excav.teleoperators.excavator_operator.config_excavator_operator import ExcavatorOperatorConfig
@@ -330,7 +330,7 @@ COMMAND_TABLES = {
     },
     "masks": {
         **dict.fromkeys(("dataset", "out"), optional(path)),
-        "source": optional(one_of("oracle", "geometry", "manual", "grounded_sam", "vlm_dig")),
+        "source": optional(one_of("oracle", "click", "geometry", "manual", "grounded_sam", "vlm_dig")),
         "main_camera": optional(text),
     },
     "card": {
@@ -373,6 +373,26 @@ COMMAND_TABLES = {
         "stages": Rule(lambda v: isinstance(v, str) and v != "", is_text=True),  # the environment decides
         **{**PAGE, "speed": number(0.1, 4.0), "open_browser": flag},
     },
+    "segmenter": {
+        **dict.fromkeys(("out", "model"), optional(path)),
+        "env_types": Rule(
+            lambda v: isinstance(v, str) and set(v.split(",")) <= {"excavator", "fr5_grasp", "toy_reach"} and v != "",
+            ("excavator", "fr5_grasp", "excavator,fr5_grasp", "arm", "", ","),
+        ),
+        **{"scenes": whole(1, 10_000), "score_scenes": whole(1, 10_000), "steps": whole(10, 1_000_000)},
+        **{"batch_size": whole(2, 1024), "seed": whole(0, 2**31 - 1)},
+        "scene_set": one_of("train", "val", "test"),
+    },
+    "testbed-emulator": {
+        "host": text,
+        **dict.fromkeys(("port", "picture_port"), whole(0, 65535)),
+        **{"first_scene": whole(0, ENDLESS), "pictures_hz": one_of(1, 2, 5, 10, 25, 50), "seed": whole(0, SEED)},
+        **{"soak_s": number(0, 3600), "speed_limit": number(high=1, above=0)},
+        **{"valve_lag_s": number(0, 5), "valve_dead_zone": number(0, below=1), "joint_noise_rad": number(0, 1)},
+        **dict.fromkeys(("loss", "duplicates"), number(0, 1)),
+        **dict.fromkeys(("delay_ms", "jitter_ms"), number(0, 10_000)),
+        "metrics": optional(path),
+    },
     "export": {
         **dict.fromkeys(("checkpoint", "out", "results"), optional(path)),
         **dict.fromkeys(("title", "license"), text),
@@ -398,6 +418,9 @@ SOIL_TABLE = {
     "penetration_scale": number(0, 100),
 }
 
+ADDRESSES = ("127.0.0.1:47500", "127.9.9.9:1")  # of this computer, or somebody has to hold the dead-man
+NO_ADDRESSES = ("", "machine", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:²", "10.0.0.7:47500", "::1:9")
+
 CONFIGURATIONS = {
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
     "excavator": (
@@ -408,6 +431,17 @@ CONFIGURATIONS = {
     "fr5_grasp": (FR5GraspEnvConfig, FR5 | ENV | {"render_camera": one_of("overview", "main", "top")}, {}),
     "excavator_sim": (ExcavatorSimConfig, EXCAVATOR | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS))}, {}),
     "fr5_sim": (FR5SimConfig, FR5 | ROBOT | {"retarget_frame": optional(whole(1, ENDLESS)), "stage": whole(0, 0)}, {}),
+    "excavator_testbed": (
+        ExcavatorTestbedConfig,
+        {
+            "address": Rule(lambda v: v in ADDRESSES, (*ADDRESSES, *NO_ADDRESSES)),
+            "dead_man": one_of("always", "gamepad"),
+            **dict.fromkeys(("dead_man_device", "dead_man_button"), whole(0, 255)),
+            **{"speed_limit": number(high=1, above=0), "ready_timeout_s": number(high=3600, above=0)},
+            "alignment_log": optional(path),
+        },
+        {},
+    ),
     "excavator_joystick": (ExcavatorJoystickConfig, JOYSTICK, {}),
     "excavator_operator": (ExcavatorOperatorConfig, {"seed": whole(0)}, {}),
     "excavator_keyboard": (
@@ -421,7 +455,7 @@ CONFIGURATIONS = {
     "soil": (SoilParameters, SOIL_TABLE, SAND),
     "demonstrations": (DemonstrationSettings, DEMOS, {"env": ExcavatorSettings()}),
 }
-COMMAND_ARGUMENTS = {name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS}
+COMMAND_ARGUMENTS = {name: module_of(name).ARGUMENTS for name in COMMANDS}
 CONFIGURATIONS |= {f"lerobot-excav {name}": (COMMAND_ARGUMENTS[name], COMMAND_TABLES[name], {}) for name in COMMANDS}
 
 

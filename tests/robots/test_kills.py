@@ -9,7 +9,7 @@ pytestmark = pytest.mark.slow
 
 def test_a_killed_recording_loses_at_most_the_episode_in_hand(tmp_path):
     with record_server() as server:
-        for seed, robot_type in enumerate(["fr5_sim", "fr5_sim", "excavator_sim"]):
+        for seed, robot_type in enumerate(["fr5_sim", "excavator_sim"]):
             folder = tmp_path / str(seed)
             folder.mkdir()
             kill_and_recover(server, folder, seed, robot_type)

@@ -1,6 +1,5 @@
 """Command lines: every option is explained, takes what it says, and is refused by its name with anything else."""
 
-import importlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import ClassVar
@@ -13,10 +12,10 @@ from hypothesis import strategies as st
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.scripts.arguments import Arguments, parse_arguments
-from lerobot_excav.scripts.main import COMMANDS, main
+from lerobot_excav.scripts.main import COMMANDS, main, module_of
 from lerobot_excav.setting import declared_settings, setting
 
-COMMAND_ARGUMENTS = {name: importlib.import_module(f"lerobot_excav.scripts.{name}").ARGUMENTS for name in COMMANDS}
+COMMAND_ARGUMENTS = {name: module_of(name).ARGUMENTS for name in COMMANDS}
 
 
 @dataclass(kw_only=True)

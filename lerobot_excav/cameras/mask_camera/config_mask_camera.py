@@ -33,10 +33,9 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
     options: str | None = None
     text: str | None = None
     command: Path | None = None
+    fps: int | None = ANY_FPS
 
     def __post_init__(self) -> None:
-        if self.fps is None:
-            self.fps = ANY_FPS
         require_choice("source of a mask camera", self.source, mask_source_names())
         require(
             not chooses_target(self.source), f"source={self.source} of a mask camera chooses where to act by itself"

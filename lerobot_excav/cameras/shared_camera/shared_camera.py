@@ -71,6 +71,16 @@ class SharedCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         """Return the newest picture without waiting, (H, W, 3)."""
         return self._noted(self._camera.read_latest(max_age_ms))
 
+    @property
+    def latest_timestamp(self) -> float | None:
+        """When the newest picture came, by `time.perf_counter` [s], if the camera tells it."""
+        return getattr(self._camera, "latest_timestamp", None)
+
+    @property
+    def taken_us(self) -> int | None:
+        """When it was taken, by the clock of the machine that sent it [us], if the camera tells it."""
+        return getattr(self._camera, "taken_us", None)
+
     def last_picture(self) -> NDArray[np.uint8]:
         """Return the picture that was read last, or read one."""
         return self.read() if self._last is None else self._last

@@ -1,0 +1,1 @@
+"""A camera whose pictures come over the network."""

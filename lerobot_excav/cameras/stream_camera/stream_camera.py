@@ -1,0 +1,99 @@
+"""The stream camera itself."""
+
+import time
+from typing import Any, override
+
+import numpy as np
+from lerobot.cameras import Camera
+from numpy.typing import NDArray
+
+from lerobot_excav.cameras.stream_camera.config_stream_camera import StreamCameraConfig
+from lerobot_excav.errors import ConfigurationError, DeviceError
+from lerobot_excav.testbed.picture_stream import Picture, PictureClient
+
+
+class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """Has the newest picture that came over the network.
+
+    Attributes:
+        latest_timestamp: When the picture that was read last had come, by `time.perf_counter` [s].
+        taken_us: When it was taken, by the machine's clock [us].
+    """
+
+    def __init__(self, config: StreamCameraConfig) -> None:
+        super().__init__(config)
+        self.config = config
+        self._client = PictureClient((config.host, config.port), config.name)
+        self.latest_timestamp: float | None = None
+        self.taken_us: int | None = None
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether pictures come."""
+        return self._client.is_connected
+
+    @staticmethod
+    def find_cameras() -> list[dict[str, Any]]:
+        """Return none: a network is not searched."""
+        return []
+
+    @override
+    def connect(self, warmup: bool = True) -> None:
+        """Connect, and wait for the first picture.
+
+        Raises:
+            DeviceError: Nobody is there, or no picture comes.
+            ConfigurationError: It has another size than was said.
+        """
+        self._client.connect(self.config.timeout_s)
+        try:
+            self.read_latest(round(1e3 * self.config.timeout_s))
+        except ConfigurationError:
+            self._client.close()
+            raise
+
+    @override
+    def disconnect(self) -> None:
+        """Disconnect."""
+        self._client.close()
+
+    @override
+    def read(self) -> NDArray[np.uint8]:
+        """Return the next picture, (H, W, 3).
+
+        Raises:
+            DeviceError: None comes in time.
+        """
+        return self._noted(self._client.next(self.config.timeout_s))
+
+    @override
+    def async_read(self, timeout_ms: float = 200.0) -> NDArray[np.uint8]:
+        """Return the newest picture, (H, W, 3), at most as old as `timeout_s`.
+
+        It does not wait for a new one: the robot measures how old it is.
+
+        Raises:
+            DeviceError: It is older.
+        """
+        return self._noted(self._client.newest(self.config.timeout_s))
+
+    @override
+    def read_latest(self, max_age_ms: int = 500) -> NDArray[np.uint8]:
+        """Return the newest picture, (H, W, 3), at most so old [ms].
+
+        Raises:
+            DeviceError: It is older.
+        """
+        return self._noted(self._client.newest(1e-3 * max_age_ms))
+
+    def _noted(self, newest: Picture) -> NDArray[np.uint8]:
+        if not self.is_connected:
+            raise DeviceError(f"the stream camera {self.config.name!r} is not connected; call connect() first")
+        taken_us, picture = newest
+        if picture.shape[:2] != (self.config.height, self.config.width):
+            raise ConfigurationError(
+                f"the stream camera {self.config.name!r} gives {picture.shape[:2]}, and was set up for "
+                f"{(self.config.height, self.config.width)} (height, width); give it the machine's size"
+            )
+        self.taken_us, self.latest_timestamp = taken_us, time.perf_counter()
+        return picture.copy()

@@ -1,0 +1,1 @@
+"""A real excavator, or its emulator, as a LeRobot robot."""

@@ -1,0 +1,87 @@
+"""Configuration of `--robot.type=excavator_testbed`."""
+
+import ipaddress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lerobot.cameras import CameraConfig
+from lerobot.robots import RobotConfig
+
+from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.setting import check_settings, setting
+
+DEAD_MEN = ("always", "gamepad")
+
+
+@RobotConfig.register_subclass("excavator_testbed")
+@dataclass(kw_only=True)
+class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
+    """Set up a machine behind a wire from LeRobot's command line.
+
+    Raises:
+        ConfigurationError: A field has a value that cannot be used.
+    """
+
+    address: str = setting("Address and port of the machine's datagrams", default="127.0.0.1:47500")
+    cameras: dict[str, CameraConfig] = field(default_factory=dict)
+    """Cameras by the names that policies know: main, cab and target_mask."""
+    dead_man: str = setting(
+        "Who lets the machine move: gamepad, a button that a person holds, or always, for an emulator on this computer",
+        default="always",
+        choices=DEAD_MEN,
+    )
+    dead_man_device: int = setting("Position of that device among the connected ones", default=0, low=0, high=255)
+    dead_man_button: int = setting("Number of the button", default=4, low=0, high=255)
+    speed_limit: float = setting(
+        "Greatest command that is sent, as a share of full speed; the machine has a limit of its own",
+        default=1.0,
+        above=0.0,
+        high=1.0,
+    )
+    ready_timeout_s: float = setting(
+        "How long to wait until the machine is ready: its soak of 30 s, and a person who lets go of everything [s]",
+        default=120.0,
+        above=0.0,
+        high=3600.0,
+    )
+    alignment_log: Path | None = setting(
+        "JSON Lines file of how old pictures and state were in every frame; left out: "
+        "outputs/excavator_testbed_alignment/<date>_<time>.jsonl",
+        default=None,
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_settings(self, "robot.")
+        host, _ = self.host_and_port
+        require(
+            self.dead_man != "always" or is_loopback(host),
+            f"robot.dead_man='always' lets the machine at {host} move while nobody watches; it is for an emulator on "
+            "this computer (127.0.0.1). Give robot.dead_man=gamepad",
+        )
+
+    @property
+    def host_and_port(self) -> tuple[str, int]:
+        """Address of the machine.
+
+        Raises:
+            ConfigurationError: It is not an IPv4 address and a port.
+        """
+        host, _, port = self.address.rpartition(":")
+        try:
+            return str(ipaddress.IPv4Address(host)), _checked_port(port)
+        except ValueError as error:
+            raise ConfigurationError(
+                f"robot.address={self.address!r} is not an address and a port, such as 192.168.1.20:47500"
+            ) from error
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether an address is this computer's own."""
+    return ipaddress.IPv4Address(host).is_loopback
+
+
+def _checked_port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 65535):
+        raise ValueError
+    return int(text)

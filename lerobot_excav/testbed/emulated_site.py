@@ -1,0 +1,94 @@
+"""Where the emulated machine works: one start after the other, each until its cycle is over."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.source import make_mask_source
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
+from lerobot_excav.testbed.protocol import RATE_HZ
+
+MASK = "target_mask"
+
+
+class EmulatedSite:
+    """Shows the targets of scene after scene to an emulated machine.
+
+    When a cycle is over, or its time is, the next target is shown, as if somebody had heaped the pile up again.
+
+    Args:
+        settings: Those of the task; its frame rate is that of the protocol.
+        machine: The machine.
+        first_scene: Number of the first scene.
+        host: Address to listen at.
+        ports: Of datagrams and pictures; 0 takes a free one.
+        on_over: Told the metrics of every cycle.
+
+    Attributes:
+        emulator: The machine, ready to run.
+    """
+
+    def __init__(
+        self,
+        settings: TaskSettings,
+        machine: EmulatedMachine,
+        *,
+        first_scene: int = 0,
+        host: str = "127.0.0.1",
+        ports: tuple[int, int] = (0, 0),
+        on_over: Callable[[dict[str, Any]], None] = lambda metrics: None,
+    ) -> None:
+        settings.require_commanded_mask()
+        self._spec = task_of_settings(settings)
+        # Without pictures of its own: at 50 Hz nobody could draw them all.
+        self._env = self._spec.make_env(
+            obs_type="agent_pos", render_mode=None, **{**settings.as_dict(), "fps": RATE_HZ}
+        )
+        self._source = CorruptedSource(
+            make_mask_source(settings.mask_source, options=settings.mask_options),
+            condition=settings.mask_condition,
+            noise=settings.mask_noise,
+            noise_px=settings.mask_noise_px,
+        )
+        self._masked: Command | None = None
+        self._mask: NDArray[np.uint8] = np.zeros((*settings.observation_size, 3), np.uint8)
+        self._start, self._tell = first_scene * self._spec.starts_per_scene, on_over
+        self._show()
+        self.emulator = Emulator(
+            self._env,
+            machine,
+            host=host,
+            port=ports[0],
+            picture_port=ports[1],
+            pictures=self.pictures,
+            on_over=self._go_on,
+        )
+
+    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+        """Return what the cameras show now, by name; the mask is made once for a command, black if nothing is found."""
+        shown = {name: self._env.renderer.render(name) for name in self._spec.cameras if name not in ("main", MASK)}
+        if self._env.command is not self._masked:
+            self._masked = self._env.command
+            mask = self._source.mask(self._env, self._masked)
+            self._mask = np.zeros_like(self._mask) if mask is None else mask.img
+        return {"main": self._env.picture(), **shown, MASK: self._mask}
+
+    def close(self) -> None:
+        """Switch the machine off, and free the graphics context."""
+        self.emulator.close()
+        self._env.close()
+
+    def _go_on(self, metrics: dict[str, Any]) -> None:
+        self._tell(metrics)
+        self._start += 1
+        self._show()
+
+    def _show(self) -> None:
+        scene_id, target_id = divmod(self._start, self._spec.starts_per_scene)
+        self._env.reset(options={"scene_id": scene_id, "target_id": target_id})

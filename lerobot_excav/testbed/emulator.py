@@ -1,0 +1,203 @@
+"""A simulated excavator that speaks the protocol of a real one, in real time."""
+
+import contextlib
+import logging
+import secrets
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lerobot_excav.envs.constants import TICK_S
+from lerobot_excav.envs.machines.excavator.constants import JOINT_RANGE_RAD
+from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.testbed.faulty_wire import FaultyWire, WireFaults
+from lerobot_excav.testbed.picture_stream import PictureServer
+from lerobot_excav.testbed.protocol import RATE_HZ, REFUSAL_WORDS, Command, DatagramError, Refusal, State, StateFlag
+from lerobot_excav.testbed.safety import SOAK_S, Limits, SafetyGate
+from lerobot_excav.testbed.valves import Valves
+
+logger = logging.getLogger(__name__)
+
+if round(1.0 / TICK_S) != RATE_HZ:
+    raise ConfigurationError(f"TICK_S={TICK_S} does not fit RATE_HZ={RATE_HZ}: a tick has a datagram")
+
+_MOST_BYTES = 2048
+_MOST_AT_ONCE = 100
+
+Env = MaskedTaskEnv[Any, Any]
+
+
+@dataclass(kw_only=True)
+class EmulatedMachine:
+    """How the machine and its wire differ from the ideal ones.
+
+    Attributes:
+        valves: Between command and motion.
+        joint_noise_rad: Standard deviation of the joint sensors [rad] (kind of the default: guess).
+        speed_limit: Greatest command that it carries out, (0, 1].
+        soak_s: How long zero commands are watched after it was switched on [s].
+        wire: Faults of the wire, each way.
+        pictures_hz: Pictures a second of each camera; divides 50.
+        seed: Of noise and faults.
+    """
+
+    valves: Valves = field(default_factory=Valves)
+    joint_noise_rad: float = 0.001
+    speed_limit: float = 1.0
+    soak_s: float = SOAK_S
+    wire: WireFaults = field(default_factory=WireFaults)
+    pictures_hz: int = 10
+    seed: int = 0
+
+
+class Emulator:
+    """Lets a simulated machine be driven over the network.
+
+    Args:
+        env: Its worksite, an environment of the excavator at 50 frames a second, reset to a scene.
+        machine: How it differs from the ideal one.
+        host: Address to listen at.
+        port: Port of the datagrams; 0 takes a free one.
+        picture_port: Port of the pictures; 0 takes a free one.
+        pictures: Returns what its cameras show now, by name, (H, W, 3) uint8.
+        on_over: Told what came of an episode, as its metrics say it; whoever is told resets `env`.
+
+    Attributes:
+        address: Host and port of the datagrams.
+        picture_address: Host and port of the pictures.
+        gate: What keeps the machine still.
+        refusals: Every reason for which it stood still or was slowed down, and when [s since the start].
+        late_ticks: How many ticks took longer than they simulate.
+    """
+
+    def __init__(
+        self,
+        env: Env,
+        machine: EmulatedMachine,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        picture_port: int = 0,
+        pictures: Callable[[], dict[str, NDArray[np.uint8]]],
+        on_over: Callable[[dict[str, Any]], None],
+    ) -> None:
+        self._env, self._machine, self._draw, self._on_over = env, machine, pictures, on_over
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind((host, port))
+        self._socket.settimeout(0.0)
+        self._pictures = PictureServer(host, picture_port)
+        self.address = host, int(self._socket.getsockname()[1])
+        self.picture_address = host, self._pictures.port
+        limits = Limits(joint_range_rad=np.array(JOINT_RANGE_RAD), speed=machine.speed_limit, soak_s=machine.soak_s)
+        self.gate = SafetyGate(limits, log=self._note_refusal)
+        self.refusals: list[tuple[float, Refusal]] = []
+        self.late_ticks = 0
+        self._rng, wire_in, wire_out = (
+            np.random.default_rng(seed) for seed in np.random.SeedSequence(machine.seed).spawn(3)
+        )
+        self._incoming: FaultyWire[tuple[bytes, tuple[str, int]]] = FaultyWire(machine.wire, wire_in)
+        self._outgoing: FaultyWire[bytes] = FaultyWire(machine.wire, wire_out)
+        self._session, self._number, self._ticks = 1 + secrets.randbelow(65535), 0, 0
+        self._host: tuple[str, int] | None = None
+        self._came_us, self._refusal = 0, Refusal.NOT_HEARD
+        self._start_s = time.monotonic()
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Play in real time until it is over; where a tick takes too long, the world is slower than real time."""
+        due_s = time.monotonic()
+        while not is_over():
+            self.tick(time.monotonic())
+            due_s, now_s = due_s + TICK_S, time.monotonic()
+            self.late_ticks += now_s > due_s
+            due_s = max(due_s, now_s)
+            time.sleep(due_s - now_s)
+
+    def tick(self, now_s: float) -> None:
+        """Hear, move, show and answer, once."""
+        self._hear(now_s)
+        verdict = self.gate.tick(self._joint_pos, now_s, TICK_S)
+        self._refusal = verdict.refusal
+        flow = self._machine.valves.step(np.array(verdict.axes), TICK_S)
+        *_, terminated, truncated, info = self._env.step(flow.astype(np.float32))
+        if terminated or truncated:
+            self._machine.valves.reset()
+            self._on_over(info["episode_metrics"])
+        if self._ticks % round(RATE_HZ / self._machine.pictures_hz) == 0:
+            self._show()
+        self._ticks += 1
+        self._answer(now_s)
+
+    def close(self) -> None:
+        """Switch it off."""
+        self._socket.close()
+        self._pictures.close()
+
+    @property
+    def clock_us(self) -> int:
+        """The machine's own clock [us]; it does not begin where the host's does."""
+        return round((time.monotonic() - self._start_s) * 1e6) + 1
+
+    @property
+    def _joint_pos(self) -> NDArray[np.float64]:
+        joint_pos: NDArray[np.float64] = self._env.world.machine.joint_pos
+        return joint_pos
+
+    def _hear(self, now_s: float) -> None:
+        for _ in range(_MOST_AT_ONCE):
+            try:
+                data, sender = self._socket.recvfrom(_MOST_BYTES)
+            except OSError:
+                break
+            self._incoming.put((data, sender), now_s)
+        for data, sender in self._incoming.take(now_s):
+            with contextlib.suppress(DatagramError):
+                if self.gate.hear(Command.decode(data), now_s):
+                    self._host, self._came_us = sender, self.clock_us  # a stranger's nonsense gets no answer
+
+    def _show(self) -> None:
+        taken_us = self.clock_us
+        for name, picture in self._draw().items():
+            self._pictures.show(name, taken_us, picture, lossless=name == "target_mask")
+
+    def _answer(self, now_s: float) -> None:
+        self._number += 1
+        self._outgoing.put(self._state(now_s).encode(), now_s)
+        for data in self._outgoing.take(now_s):
+            if self._host is not None:
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(data, self._host)
+
+    def _state(self, now_s: float) -> State:
+        flags = StateFlag.ARMED if self.gate.is_armed else StateFlag.NONE
+        flags |= StateFlag.STOP_LATCHED if self.gate.is_stopped else StateFlag.NONE
+        flags |= StateFlag.HOST_HEARD if self.gate.is_heard(now_s) else StateFlag.NONE
+        machine, command, clock_us = self._env.world.machine, self.gate.command, self.clock_us
+        noise = self._machine.joint_noise_rad * self._rng.standard_normal(4)
+        echo = {}
+        if command is not None:
+            echo = {
+                "command_session": command.session,
+                "command_number": command.number,
+                "command_host_us": command.host_us,
+                "command_age_us": clock_us - self._came_us,
+            }
+        return State(
+            session=self._session,
+            number=self._number,
+            machine_us=clock_us,
+            joint_pos=tuple((machine.joint_pos + noise).tolist()),
+            joint_vel=tuple(machine.joint_vel.tolist()),
+            refusal=self._refusal,
+            flags=flags,
+            **echo,
+        )
+
+    def _note_refusal(self, refusal: Refusal) -> None:
+        self.refusals.append((time.monotonic() - self._start_s, refusal))
+        logger.info("%s", REFUSAL_WORDS[refusal])

@@ -1,0 +1,185 @@
+"""Pictures over the network: a server that offers cameras by name, and a client that has the newest one.
+
+A client connects by TCP and sends the camera's name and a line feed. Then pictures come as long as it listens, each as
+12 bytes (uint64 clock of the machine at its exposure [us], uint32 size, little-endian) and a JPEG or PNG file. Who is
+slow misses pictures; none is queued.
+"""
+
+import contextlib
+import io
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from lerobot_excav.errors import DeviceError
+
+_HEADER = struct.Struct("<QI")
+_LONGEST_NAME = 64
+_MOST_BYTES = 50_000_000
+
+Picture = tuple[int, NDArray[np.uint8]]
+"""Clock of the machine at the exposure [us], and the picture (H, W, 3)."""
+
+
+class PictureServer:
+    """Offers the newest picture of every camera.
+
+    Args:
+        host: Address to listen at.
+        port: Port; 0 takes a free one.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._socket = socket.create_server((host, port))
+        self.port: int = self._socket.getsockname()[1]
+        self._files: dict[str, tuple[int, bytes]] = {}
+        self._change = threading.Condition()
+        self._is_over = False
+        threading.Thread(target=self._serve, name="pictures", daemon=True).start()
+
+    def show(self, name: str, taken_us: int, picture: NDArray[np.uint8], *, lossless: bool = False) -> None:
+        """Make a picture (H, W, 3) the newest one of a camera; `lossless` keeps every pixel."""
+        file = io.BytesIO()
+        image = Image.fromarray(picture)
+        image.save(file, "PNG", compress_level=1) if lossless else image.save(file, "JPEG", quality=95)
+        with self._change:
+            self._files[name] = taken_us, file.getvalue()
+            self._change.notify_all()
+
+    def close(self) -> None:
+        """Stop; clients lose their connection."""
+        with self._change:
+            self._is_over = True
+            self._change.notify_all()
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)  # or a thread that waits for clients would go on doing so
+        self._socket.close()
+
+    def _serve(self) -> None:
+        while not self._is_over:
+            try:
+                client, _ = self._socket.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._attend, args=(client,), name="a viewer", daemon=True).start()
+
+    def _attend(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError), client:
+            client.settimeout(5.0)
+            name = client.makefile("rb").readline(_LONGEST_NAME).decode(errors="replace").strip()
+            last_us = -1
+            while True:
+                newer = self._newer(name, last_us)
+                if newer is None:
+                    return
+                last_us, data = newer
+                client.sendall(_HEADER.pack(last_us, len(data)) + data)
+
+    def _newer(self, name: str, than_us: int) -> tuple[int, bytes] | None:
+        """Wait for a picture of a camera taken at another time; None when all is over."""
+        with self._change:
+            self._change.wait_for(lambda: self._is_over or self._files.get(name, (than_us,))[0] != than_us)
+            return None if self._is_over else self._files[name]
+
+
+class PictureClient:
+    """Has the newest picture of a camera.
+
+    Args:
+        address: Host and port of the server.
+        name: The camera.
+        clock_s: Tells the time.
+    """
+
+    def __init__(self, address: tuple[str, int], name: str, *, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._address, self._name, self._clock_s = address, name, clock_s
+        self._change = threading.Condition()
+        self._newest: Picture | None = None
+        self._came_s, self._count = 0.0, 0
+        self._socket: socket.socket | None = None
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether it is connected."""
+        return self._socket is not None
+
+    def connect(self, timeout_s: float) -> None:
+        """Connect, and wait for the first picture.
+
+        Raises:
+            DeviceError: Nobody listens there, or no picture comes in time.
+        """
+        where = f"{self._address[0]}:{self._address[1]}"
+        try:
+            self._socket = socket.create_connection(self._address, timeout=timeout_s)
+            self._socket.sendall(self._name.encode() + b"\n")
+        except OSError as error:
+            self._socket = None
+            raise DeviceError(f"the picture stream at {where} cannot be reached: {error}") from error
+        threading.Thread(target=self._listen, args=(self._socket,), name=self._name, daemon=True).start()
+        try:
+            self.next(timeout_s)
+        except DeviceError as error:
+            self.close()
+            raise DeviceError(
+                f"no picture of {self._name!r} came from {where}; check the name, main or cab, say"
+            ) from error
+
+    def close(self) -> None:
+        """Disconnect."""
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
+            self._socket.close()
+        self._socket, self._newest = None, None
+
+    def newest(self, oldest_s: float) -> Picture:
+        """Return the newest picture.
+
+        Raises:
+            DeviceError: None came within the last `oldest_s`.
+        """
+        with self._change:
+            if self._newest is None or self._clock_s() - self._came_s > oldest_s:
+                raise DeviceError(f"no picture of {self._name!r} came within {oldest_s:.2f} s; is the machine on?")
+            return self._newest
+
+    def next(self, timeout_s: float) -> Picture:
+        """Wait for a picture that has not been returned yet.
+
+        Raises:
+            DeviceError: None comes in time.
+        """
+        with self._change:
+            seen = self._count
+            if not self._change.wait_for(lambda: self._count > seen or self._socket is None, timeout_s):
+                raise DeviceError(f"no picture of {self._name!r} came within {timeout_s:.2f} s; is the machine on?")
+            if self._newest is None:
+                raise DeviceError(f"the stream of {self._name!r} is closed")
+            return self._newest
+
+    def _listen(self, connection: socket.socket) -> None:
+        connection.settimeout(None)
+        with contextlib.suppress(OSError, EOFError, ValueError), connection.makefile("rb") as file:
+            while True:
+                taken_us, size = _HEADER.unpack(_exactly(file, _HEADER.size))
+                if size > _MOST_BYTES:
+                    raise ValueError(f"a picture of {size} bytes")
+                picture = np.asarray(Image.open(io.BytesIO(_exactly(file, size))).convert("RGB"))
+                with self._change:
+                    self._newest, self._came_s = (taken_us, picture), self._clock_s()
+                    self._count += 1
+                    self._change.notify_all()
+
+
+def _exactly(file: io.BufferedReader, size: int) -> bytes:
+    data = file.read(size)
+    if len(data) < size:
+        raise EOFError
+    return data

@@ -1,0 +1,178 @@
+"""The safety table of the machine, a test for every row."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.testbed.protocol import RATE_HZ, Command, CommandFlag, Refusal
+from lerobot_excav.testbed.safety import GATE_SAMPLES, STALE_S, WATCHDOG_S, Limits, SafetyGate
+
+RANGE = np.array([[-1.0, 1.0]] * 4)
+FREE = np.zeros(4)
+TICK_S = 1.0 / RATE_HZ
+FULL = (1.0, -1.0, 0.5, 0.0)
+HELD, STOP, RELEASE = CommandFlag.DEAD_MAN, CommandFlag.EMERGENCY_STOP, CommandFlag.RELEASE
+
+
+class Wire:
+    """A host that sends a command every tick, and the machine's gate behind it."""
+
+    def __init__(self, **limits):
+        self.log = []
+        self.gate = SafetyGate(
+            Limits(joint_range_rad=RANGE, **{"soak_s": 0.0, **limits}), log=lambda refusal: self.log.append(refusal)
+        )
+        self.now_s, self.number, self.session = 100.0, 0, 1
+
+    def tick(self, axes=(0.0,) * 4, flags=CommandFlag.NONE, *, joint_pos=FREE, age_us=0, is_sent=True):
+        self.now_s += TICK_S
+        if is_sent:
+            self.number += 1
+            self.gate.hear(
+                Command(session=self.session, number=self.number, host_us=0, axes=axes, age_us=age_us, flags=flags),
+                self.now_s,
+            )
+        return self.gate.tick(np.asarray(joint_pos, float), self.now_s, TICK_S)
+
+    def armed(self):
+        for _ in range(GATE_SAMPLES + 1):
+            self.tick()
+        assert self.gate.is_armed
+        return self
+
+
+def test_armed_and_with_the_dead_man_held_it_moves_as_told():
+    verdict = Wire().armed().tick(FULL, HELD)
+    assert (verdict.axes, verdict.refusal) == (FULL, Refusal.NONE)
+
+
+@pytest.mark.parametrize("refused", [{"axes": FULL, "flags": CommandFlag.NONE}, {"axes": (0.0,) * 4, "flags": HELD}])
+def test_the_start_gate_wants_ten_samples_in_a_row_with_sticks_centred_and_the_dead_man_let_go(refused):
+    wire = Wire()
+    for _ in range(3):  # whatever interrupts the row begins it again
+        for _ in range(GATE_SAMPLES - 1):
+            wire.tick()
+        assert wire.tick(**refused).refusal is Refusal.START_GATE
+    assert wire.tick(FULL, HELD).refusal is Refusal.START_GATE
+    assert wire.armed().tick(FULL, HELD).refusal is Refusal.NONE
+
+
+def test_the_dead_man_has_to_be_held_in_every_sample():
+    wire = Wire().armed()
+    assert wire.tick(FULL, HELD).axes == FULL
+    assert wire.tick(FULL).axes == (0.0,) * 4
+    assert wire.log[-1] is Refusal.DEAD_MAN
+    assert wire.tick(FULL, HELD).axes == FULL  # let go is not lost
+
+
+@pytest.mark.parametrize(
+    ("age_s", "silent_ticks", "moves"),
+    [(0.0, 0, True), (0.14, 0, True), (0.16, 0, False), (0.0, 7, True), (0.0, 8, False), (0.1, 3, False)],
+)
+def test_a_command_that_is_older_than_150_ms_counts_as_zero_wherever_it_got_old(age_s, silent_ticks, moves):
+    assert STALE_S == 0.15
+    wire = Wire().armed()
+    verdict = wire.tick(FULL, HELD, age_us=round(age_s * 1e6))
+    for _ in range(silent_ticks):
+        verdict = wire.tick(is_sent=False)
+    assert verdict.refusal is (Refusal.NONE if moves else Refusal.STALE)
+    assert (verdict.axes == FULL) is moves
+
+
+def test_after_half_a_second_of_silence_the_link_is_lost_and_the_gate_is_asked_again():
+    wire = Wire().armed()
+    for _ in range(round(WATCHDOG_S / TICK_S) + 1):
+        verdict = wire.tick(is_sent=False)
+    assert verdict.refusal is Refusal.NOT_HEARD
+    assert wire.tick(FULL, HELD).refusal is Refusal.START_GATE
+    assert wire.armed().tick(FULL, HELD).axes == FULL
+
+
+def test_a_host_that_starts_again_is_asked_for_the_gate_too_however_quickly():
+    wire = Wire().armed()
+    wire.tick(FULL, HELD)
+    wire.session, wire.number = 2, 0
+    assert wire.tick(FULL, HELD).refusal is Refusal.START_GATE
+
+
+def test_datagrams_that_come_twice_or_late_change_nothing():
+    wire = Wire().armed()
+    wire.tick(FULL, HELD)
+    for number in (1, wire.number):
+        late = Command(session=1, number=number, host_us=0, axes=(-1.0,) * 4, flags=HELD)
+        assert not wire.gate.hear(late, wire.now_s)
+    assert wire.gate.tick(FREE, wire.now_s, TICK_S).axes == FULL
+
+
+def test_nothing_moves_until_thirty_seconds_of_zero_commands_have_been_watched_once():
+    wire = Wire(soak_s=30.0)
+    for tick in range(30 * RATE_HZ):
+        assert wire.tick().refusal is Refusal.SOAK, tick
+        if tick == 100:  # a stick that is moved begins it again
+            wire.tick(FULL)
+    for _ in range(105):
+        wire.tick()
+    assert wire.tick(FULL, HELD).refusal is Refusal.NONE
+    for _ in range(50):
+        wire.tick(is_sent=False)
+    assert wire.armed().tick(FULL, HELD).refusal is Refusal.NONE  # of the first run only
+
+
+def test_the_emergency_stop_latches_until_it_is_released_with_everything_let_go():
+    wire = Wire().armed()
+    assert wire.tick(FULL, HELD | STOP).axes == (0.0,) * 4
+    for flags in (HELD, CommandFlag.NONE, HELD | RELEASE):
+        assert wire.tick(FULL, flags).refusal is Refusal.EMERGENCY_STOP
+    wire.session, wire.number = 9, 0  # a new host does not release it either
+    assert wire.tick().refusal is Refusal.EMERGENCY_STOP
+    assert wire.tick(FULL, RELEASE).refusal is Refusal.EMERGENCY_STOP
+    assert wire.tick(flags=RELEASE).refusal is Refusal.START_GATE
+    assert wire.armed().tick(FULL, HELD).axes == FULL
+
+
+def test_the_machine_is_never_faster_than_allowed():
+    wire = Wire(speed=0.4).armed()
+    verdict = wire.tick(FULL, HELD)
+    assert verdict.axes == (0.4, -0.4, 0.4, 0.0)
+    assert verdict.refusal is Refusal.SPEED_LIMIT
+    assert wire.tick((0.3, 0.0, 0.0, 0.0), HELD).refusal is Refusal.NONE
+
+
+@pytest.mark.parametrize("axis", range(4))
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_at_its_limit_a_joint_moves_back_only_and_the_others_move_on(axis, side):
+    wire, joint_pos, out = Wire().armed(), np.zeros(4), np.full(4, 0.5)
+    joint_pos[axis], out[axis] = 0.99 * side, side
+    verdict = wire.tick(tuple(out), HELD, joint_pos=joint_pos)
+    assert verdict.axes[axis] == 0.0
+    assert verdict.refusal is Refusal.JOINT_LIMIT
+    assert sum(value == 0.5 for value in verdict.axes) == 3
+    out[axis] = -side
+    assert wire.tick(tuple(out), HELD, joint_pos=joint_pos).axes == tuple(out)
+
+
+def test_every_change_of_the_reason_is_logged_once():
+    wire = Wire().armed()
+    for _ in range(5):
+        wire.tick(FULL)
+    wire.tick(FULL, HELD)
+    assert wire.log == [Refusal.START_GATE, Refusal.DEAD_MAN, Refusal.NONE]
+
+
+STEPS = st.tuples(
+    st.sampled_from([FULL, (0.0,) * 4]), st.integers(0, 7), st.sampled_from([0, 0, 200_000]), st.booleans()
+)
+
+
+@given(st.lists(STEPS, max_size=60))
+def test_whatever_comes_it_moves_only_when_armed_held_fresh_and_not_stopped(steps):
+    wire = Wire()
+    wire.armed()
+    for axes, flags, age_us, is_sent in steps:
+        verdict = wire.tick(axes, CommandFlag(flags), age_us=age_us, is_sent=is_sent)
+        if any(verdict.axes):
+            assert wire.gate.is_armed
+            assert not wire.gate.is_stopped
+            assert wire.gate.command.flags & HELD
+            assert wire.gate.command.age_us <= 150_000
