@@ -10,6 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from pkgutil import resolve_name
 
+import lerobot.robots.so_follower  # noqa: F401 - pages name one of its arms
 import pytest
 from lerobot.configs import PreTrainedConfig
 from lerobot.envs.configs import EnvConfig

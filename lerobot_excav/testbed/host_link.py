@@ -75,7 +75,7 @@ class HostLink:
         self._is_over = threading.Event()
         self._lets_go = False
 
-    def open(self) -> None:
+    def connect(self) -> None:
         """Begin to talk.
 
         Raises:

@@ -47,7 +47,7 @@ def emulated(settings=None, **machine):
 def linked(served, dead_man=None, hold_s=STALE_S):
     """Open a wire to a machine."""
     link = HostLink(served.emulator.address, dead_man=dead_man or AlwaysHeld(), hold_s=hold_s)
-    link.open()
+    link.connect()
     try:
         yield link
     finally:

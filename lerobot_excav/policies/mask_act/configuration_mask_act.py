@@ -11,7 +11,12 @@ from lerobot.optim.schedulers import ConstantWithWarmupSchedulerConfig, CosineAn
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
-from lerobot_excav.policies.mask_act.features import NORMALISED, check_features, check_normalization
+from lerobot_excav.policies.mask_act.features import (
+    NORMALISED,
+    check_features,
+    check_normalization,
+    require_mask_shape,
+)
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
@@ -378,18 +383,6 @@ MISSING_MASK_HINT = (
     "Record or generate demonstrations with the target mask (`lerobot-excav demos` writes it), name another feature "
     "with --policy.mask_key, or train the no-condition variant with --policy.withhold_mask=true."
 )
-
-
-def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]) -> None:
-    """Raise `ConfigurationError` unless the shape of a mask fits its camera: ([B,] 1 or 3, H, W) to ([B,] 3, H, W)."""
-    *batch, _, height, width = main_shape
-    allowed = [(*batch, channels, height, width) for channels in (1, 3)]
-    require(
-        mask_shape in allowed,
-        f"{mask_key} has shape {mask_shape}, {main_key} has shape {main_shape}; a mask marks pixels of its camera, so "
-        f"its shape must be {allowed[0]} or {allowed[1]} (channels, height, width). Render both at one size, or set "
-        "--policy.main_camera to the camera that the mask belongs to.",
-    )
 
 
 _ACTS_OWN = frozenset(field.name for field in fields(ACTConfig))

@@ -69,3 +69,15 @@ def check_normalization(field: str, mapping: Mapping[str, NormalizationMode]) ->
         f"{field}={shown(dict(mapping))} is not possible ({', '.join(wrong)}); name {', '.join(NORMALISED)}; known are "
         f"{', '.join(kinds)}.",
     )
+
+
+def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]) -> None:
+    """Raise `ConfigurationError` unless the shape of a mask fits its camera: ([B,] 1 or 3, H, W) to ([B,] 3, H, W)."""
+    *batch, _, height, width = main_shape
+    allowed = [(*batch, channels, height, width) for channels in (1, 3)]
+    require(
+        mask_shape in allowed,
+        f"{mask_key} has shape {mask_shape}, {main_key} has shape {main_shape}; a mask marks pixels of its camera, so "
+        f"its shape must be {allowed[0]} or {allowed[1]} (channels, height, width). Render both at one size, or set "
+        "--policy.main_camera to the camera that the mask belongs to.",
+    )

@@ -95,7 +95,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
         self._log.start()
         link = HostLink(self.config.host_and_port, dead_man=self._dead_man(), hold_s=STALE_S)
-        link.open()
+        link.connect()
         self.link = link
         try:
             self._wait_until_ready(link)
