@@ -113,7 +113,7 @@ def recorded(tmp_path_factory):
             dataset.add_frame(
                 {
                     "observation.images.top": painted(200 + 150 * episode),
-                    "observation.images.wrist": rng.integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8),
+                    "observation.images.wrist": painted(20 * frame),
                     "observation.state": joints,
                     "action": joints + rng.normal(0.0, 0.01, 6).astype(np.float32),
                     "task": "take the block",
@@ -191,7 +191,7 @@ def test_recordings_get_masks_a_policy_learns_them_and_the_robot_is_driven_by_a_
         lerobot_rollout,
         *("--robot.type=bench_arm", f"--robot.cameras={cameras}", f"--robot.calibration_dir={tmp_path}"),
         *(f"--policy.path={policy}", "--policy.device=cpu", "--strategy.type=base", "--task=take the block"),
-        *(f"--fps={FPS}", "--duration=1", "--play_sounds=false", "--return_to_initial_position=false"),
+        *(f"--fps={FPS}", "--duration=4", "--play_sounds=false", "--return_to_initial_position=false"),
     )
     assert len(BenchArm.actions) > 3
     assert all(np.isfinite(list(action.values())).all() and set(action) == set(JOINTS) for action in BenchArm.actions)

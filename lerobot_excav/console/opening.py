@@ -70,6 +70,11 @@ def open_console(
         schedule.env.episode_length is None,
         f"--env.episode_length={schedule.env.episode_length} has no effect: a person ends an episode; leave it out",
     )
+    retarget_frame = getattr(schedule.env, "retarget_frame", None)
+    require(
+        retarget_frame is None,
+        f"--env.retarget_frame={retarget_frame} has no place on the page, where a person points; leave it out",
+    )
     require(spec.sticks_entry is not None, f"{spec.id} does not say what sticks do to its machine")
     recording = None if out is None else Recording(schedule, out)
     env: MaskedTaskEnv[Any, Any] = spec.make_env(**{**schedule.env.as_dict(), "episode_length": ENDLESS_FRAMES})

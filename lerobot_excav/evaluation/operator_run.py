@@ -102,8 +102,7 @@ def play_for_metrics(settings: PlayedScenes, pair: Pair) -> list[dict[str, Any]]
 
 def _operator(settings: PlayedScenes) -> dict[str, Any]:
     """Return what the environment does not know: who plays."""
-    retarget = {"operator_retarget": settings.retarget} if settings.retarget else {}
-    return {"operator": "scripted", "operator_seed": settings.seed, **retarget}
+    return {"operator": "scripted", "operator_seed": settings.seed}
 
 
 def _expected(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
@@ -111,7 +110,6 @@ def _expected(settings: PlayedScenes, pair: Pair) -> dict[str, Any]:
     env = {name: value for name, value in settings.env.as_dict().items() if value is not None}
     return {
         **_operator(settings),
-        "operator_retarget": settings.retarget or None,
         "simulation_version": settings.task_spec.simulation_version,
         **env,
         "scene_id": pair.scene_id,

@@ -63,6 +63,13 @@ class TestbedEmulatorArguments(Arguments):
             spec.env_type == "excavator",
             f"--env.type={spec.env_type} is no excavator; leave it out, or give --env.type=excavator",
         )
+        for name in ("fps", "episode_length", "retarget_frame", "target_overlay"):
+            value, usual = getattr(self.env, name), getattr(type(self.env), name)
+            require(
+                value == usual,
+                f"--env.{name}={value} has no place here: the machine ticks at {RATE_HZ} Hz, and shows what it is told "
+                "by target_mask alone; leave it out",
+            )
 
 
 def run(arguments: TestbedEmulatorArguments) -> int:

@@ -28,7 +28,8 @@ class ClockOffset:
         trip_us = max(0, came_us - sent_us - held_us)
         offset_us = came_us - trip_us // 2 - machine_us
         if self._exchanges and abs(offset_us - self.offset_us) > JUMP_US + trip_us:
-            self._exchanges.clear()
+            self._exchanges = deque([(trip_us, offset_us)], maxlen=KEPT)  # in one step: others read it
+            return
         self._exchanges.append((trip_us, offset_us))
 
     @property
@@ -39,9 +40,9 @@ class ClockOffset:
     @property
     def offset_us(self) -> int:
         """Host's clock minus the machine's [us]."""
-        return min(self._exchanges)[1]
+        return min(tuple(self._exchanges))[1]
 
     @property
     def trip_us(self) -> int:
         """The shortest round trip lately [us]."""
-        return min(self._exchanges)[0]
+        return min(tuple(self._exchanges))[0]

@@ -34,10 +34,11 @@ class GamepadButton:
 
     def __init__(self, device: int, button: int) -> None:
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # no window is needed
+        os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")  # no window has the focus
         import pygame
 
         self._pygame = pygame
-        pygame.init()
+        pygame.display.init()  # events need it
         pygame.joystick.init()
         count = pygame.joystick.get_count()
         if device >= count:
@@ -50,9 +51,18 @@ class GamepadButton:
                 f"robot.dead_man_button={button} does not exist; {self._joystick.get_name()} has the buttons 0 to "
                 f"{self._joystick.get_numbuttons() - 1}"
             )
-        self._button = button
+        self._button, self._instance_id = button, self._joystick.get_instance_id()
 
     def is_held(self) -> bool:
         """Tell whether the button is pressed now."""
-        self._pygame.event.pump()
-        return bool(self._joystick.get_init() and self._joystick.get_button(self._button))
+        try:
+            self._pygame.event.get()  # updates the device; emptied, or the queue fills up and drops news
+            return self._is_attached() and bool(self._joystick.get_button(self._button))
+        except self._pygame.error:  # somebody has ended SDL: as good as let go
+            return False
+
+    def _is_attached(self) -> bool:
+        """Tell whether the device is there: SDL keeps answering with the last values of one that is gone."""
+        joysticks = self._pygame.joystick
+        present = (joysticks.Joystick(i).get_instance_id() for i in range(joysticks.get_count()))
+        return self._instance_id in present

@@ -73,11 +73,16 @@ class EmulatedSite:
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
         """Return what the cameras show now, by name; the mask is made once for a command, black if nothing is found."""
         shown = {name: self._env.renderer.render(name) for name in self._spec.cameras if name not in ("main", MASK)}
-        if self._env.command is not self._masked:
-            self._masked = self._env.command
-            mask = self._source.mask(self._env, self._masked)
-            self._mask = np.zeros_like(self._mask) if mask is None else mask.img
+        self._look()
         return {"main": self._env.picture(), **shown, MASK: self._mask}
+
+    def _look(self) -> None:
+        """Make the mask of a new command."""
+        if self._env.command is self._masked:
+            return
+        self._masked = self._env.command
+        mask = self._source.mask(self._env, self._masked)
+        self._mask = np.zeros_like(self._mask) if mask is None else mask.img
 
     def close(self) -> None:
         """Switch the machine off, and free the graphics context."""
@@ -92,3 +97,4 @@ class EmulatedSite:
     def _show(self) -> None:
         scene_id, target_id = divmod(self._start, self._spec.starts_per_scene)
         self._env.reset(options={"scene_id": scene_id, "target_id": target_id})
+        self._look()

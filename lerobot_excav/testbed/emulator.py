@@ -4,8 +4,9 @@ import contextlib
 import logging
 import secrets
 import socket
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.constants import TICK_S
-from lerobot_excav.envs.machines.excavator.constants import JOINT_RANGE_RAD
+from lerobot_excav.envs.machines.excavator.constants import JOINT_ACCEL_RAD_S2, JOINT_RANGE_RAD
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, DeviceError
 from lerobot_excav.testbed.faulty_wire import FaultyWire, WireFaults
 from lerobot_excav.testbed.picture_stream import PictureServer
 from lerobot_excav.testbed.protocol import RATE_HZ, REFUSAL_WORDS, Command, DatagramError, Refusal, State, StateFlag
-from lerobot_excav.testbed.safety import SOAK_S, Limits, SafetyGate
+from lerobot_excav.testbed.safety import SOAK_S, Limits, SafetyGate, Verdict
 from lerobot_excav.testbed.valves import Valves
 
 logger = logging.getLogger(__name__)
@@ -74,6 +75,9 @@ class Emulator:
         gate: What keeps the machine still.
         refusals: Every reason for which it stood still or was slowed down, and when [s since the start].
         late_ticks: How many ticks took longer than they simulate.
+
+    Raises:
+        DeviceError: A port is taken, or the address is not this computer's.
     """
 
     def __init__(
@@ -88,13 +92,20 @@ class Emulator:
         on_over: Callable[[dict[str, Any]], None],
     ) -> None:
         self._env, self._machine, self._draw, self._on_over = env, machine, pictures, on_over
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind((host, port))
-        self._socket.settimeout(0.0)
-        self._pictures = PictureServer(host, picture_port)
+        self._socket = _bound(host, port)
+        try:
+            self._pictures = PictureServer(host, picture_port)
+        except DeviceError:
+            self._socket.close()
+            raise
         self.address = host, int(self._socket.getsockname()[1])
         self.picture_address = host, self._pictures.port
-        limits = Limits(joint_range_rad=np.array(JOINT_RANGE_RAD), speed=machine.speed_limit, soak_s=machine.soak_s)
+        limits = Limits(
+            joint_range_rad=np.array(JOINT_RANGE_RAD),
+            joint_accel_rad_s2=np.array(JOINT_ACCEL_RAD_S2),
+            speed=machine.speed_limit,
+            soak_s=machine.soak_s,
+        )
         self.gate = SafetyGate(limits, log=self._note_refusal)
         self.refusals: list[tuple[float, Refusal]] = []
         self.late_ticks = 0
@@ -106,6 +117,7 @@ class Emulator:
         self._session, self._number, self._ticks = 1 + secrets.randbelow(65535), 0, 0
         self._host: tuple[str, int] | None = None
         self._came_us, self._refusal = 0, Refusal.NOT_HEARD
+        self._joint_pos, self._joint_vel = self._joints()
         self._start_s = time.monotonic()
 
     def run(self, is_over: Callable[[], bool]) -> None:
@@ -120,14 +132,15 @@ class Emulator:
 
     def tick(self, now_s: float) -> None:
         """Hear, move, show and answer, once."""
-        self._hear(now_s)
-        verdict = self.gate.tick(self._joint_pos, now_s, TICK_S)
-        self._refusal = verdict.refusal
+        verdict = self._judge(now_s)
         flow = self._machine.valves.step(np.array(verdict.axes), TICK_S)
         *_, terminated, truncated, info = self._env.step(flow.astype(np.float32))
+        self._joint_pos, self._joint_vel = self._joints()
         if terminated or truncated:
             self._machine.valves.reset()
-            self._on_over(info["episode_metrics"])
+            with self._answering():
+                self._on_over(info["episode_metrics"])
+            self._joint_pos, self._joint_vel = self._joints()
         if self._ticks % round(RATE_HZ / self._machine.pictures_hz) == 0:
             self._show()
         self._ticks += 1
@@ -143,10 +156,34 @@ class Emulator:
         """The machine's own clock [us]; it does not begin where the host's does."""
         return round((time.monotonic() - self._start_s) * 1e6) + 1
 
-    @property
-    def _joint_pos(self) -> NDArray[np.float64]:
-        joint_pos: NDArray[np.float64] = self._env.world.machine.joint_pos
-        return joint_pos
+    def _joints(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        machine = self._env.world.machine
+        return machine.joint_pos, machine.joint_vel
+
+    def _judge(self, now_s: float) -> Verdict:
+        self._hear(now_s)
+        verdict = self.gate.tick(self._joint_pos, self._joint_vel, now_s, TICK_S)
+        self._refusal = verdict.refusal
+        return verdict
+
+    @contextlib.contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Go on hearing and answering, standing still, while the next start is built up: that takes long."""
+        is_over = threading.Event()
+
+        def answer() -> None:
+            while not is_over.wait(TICK_S):
+                now_s = time.monotonic()
+                self._judge(now_s)
+                self._answer(now_s)
+
+        thread = threading.Thread(target=answer, name="testbed answers", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            thread.join()
 
     def _hear(self, now_s: float) -> None:
         for _ in range(_MOST_AT_ONCE):
@@ -177,7 +214,7 @@ class Emulator:
         flags = StateFlag.ARMED if self.gate.is_armed else StateFlag.NONE
         flags |= StateFlag.STOP_LATCHED if self.gate.is_stopped else StateFlag.NONE
         flags |= StateFlag.HOST_HEARD if self.gate.is_heard(now_s) else StateFlag.NONE
-        machine, command, clock_us = self._env.world.machine, self.gate.command, self.clock_us
+        command, clock_us = self.gate.command, self.clock_us
         noise = self._machine.joint_noise_rad * self._rng.standard_normal(4)
         echo = {}
         if command is not None:
@@ -191,8 +228,8 @@ class Emulator:
             session=self._session,
             number=self._number,
             machine_us=clock_us,
-            joint_pos=tuple((machine.joint_pos + noise).tolist()),
-            joint_vel=tuple(machine.joint_vel.tolist()),
+            joint_pos=tuple((self._joint_pos + noise).tolist()),
+            joint_vel=tuple(self._joint_vel.tolist()),
             refusal=self._refusal,
             flags=flags,
             **echo,
@@ -201,3 +238,22 @@ class Emulator:
     def _note_refusal(self, refusal: Refusal) -> None:
         self.refusals.append((time.monotonic() - self._start_s, refusal))
         logger.info("%s", REFUSAL_WORDS[refusal])
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """Return a socket that listens there.
+
+    Raises:
+        DeviceError: It cannot.
+    """
+    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        listening.bind((host, port))
+    except OSError as error:
+        listening.close()
+        raise DeviceError(
+            f"--host={host} --port={port} cannot be listened at: {error}; give an address of this computer and a free "
+            "port, 0 for any"
+        ) from error
+    listening.settimeout(0.0)
+    return listening

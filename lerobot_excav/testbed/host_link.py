@@ -23,6 +23,7 @@ from lerobot_excav.testbed.protocol import (
     Newest,
     Refusal,
     State,
+    StateFlag,
 )
 from lerobot_excav.testbed.safety import STILL, WATCHDOG_S
 
@@ -72,6 +73,7 @@ class HostLink:
         self._heard: Heard | None = None
         self._refusal = Refusal.NONE
         self._thread: threading.Thread | None = None
+        self._fault: BaseException | None = None
         self._is_over = threading.Event()
         self._lets_go = False
 
@@ -81,10 +83,11 @@ class HostLink:
         Raises:
             DeviceError: The address cannot be used.
         """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._socket.connect(self.address)
         except OSError as error:
+            self._socket.close()
             raise DeviceError(f"robot.address={self.address[0]}:{self.address[1]} cannot be used: {error}") from error
         self._socket.settimeout(0.0)
         self._session = 1 + secrets.randbelow(65535)
@@ -97,14 +100,20 @@ class HostLink:
         """Send zero once more, and stop talking; the machine's watchdog does the rest."""
         if self._thread is None:
             return
-        self.give(STILL)
+        with self._lock:
+            self._axes = STILL
         self._is_over.set()
         self._thread.join(timeout=2.0)
         self._thread = None
         self._socket.close()
 
     def give(self, axes: tuple[float, float, float, float]) -> None:
-        """Hold this command from now on, fractions of full speed in [-1, 1]."""
+        """Hold this command from now on, fractions of full speed in [-1, 1].
+
+        Raises:
+            DeviceError: The wire has failed; so say all that use it.
+        """
+        self._require_alive()
         with self._lock:
             self._axes, self._given_us = axes, self._clock_us()
 
@@ -114,11 +123,16 @@ class HostLink:
 
     def stop(self) -> None:
         """Stop at once, and stay stopped until `release`."""
+        self._require_alive()
         with self._lock:
             self._flags, self._axes = CommandFlag.EMERGENCY_STOP, STILL
 
     def release(self) -> None:
-        """Ask the machine to release the emergency stop; it does with centred sticks and the dead-man let go."""
+        """Ask the machine to release the emergency stop; it does with centred sticks and the dead-man let go.
+
+        It is asked until it says that the stop is not latched any more.
+        """
+        self._require_alive()
         with self._lock:
             self._flags = CommandFlag.RELEASE
 
@@ -128,6 +142,7 @@ class HostLink:
         Raises:
             DeviceError: The machine was not heard for `WATCHDOG_S`.
         """
+        self._require_alive()
         with self._lock:
             heard, now_us = self._heard, self._clock_us()
         age_s = float("inf") if heard is None else (now_us - heard.true_us) * 1e-6
@@ -149,7 +164,17 @@ class HostLink:
         """How long a command is under way [us]: the machine cannot know it, for its clock is another."""
         return self._offset.trip_us // 2 if self._offset.is_known else 0
 
+    def _require_alive(self) -> None:
+        if self._fault is not None:
+            raise DeviceError(f"the wire to {self.address[0]} has failed: {self._fault!r}") from self._fault
+
     def _run(self) -> None:
+        try:
+            self._talk()
+        except BaseException as fault:  # it is told to whoever uses the wire; the machine's watchdog stops the machine
+            self._fault = fault
+
+    def _talk(self) -> None:
         due = time.monotonic()
         while not self._is_over.is_set():
             self._send()
@@ -159,9 +184,9 @@ class HostLink:
             self._send()
 
     def _send(self) -> None:
-        now_us = self._clock_us()
         with self._lock:
-            age_us, axes, flags = now_us - self._given_us, self._axes, self._flags
+            now_us = self._clock_us()
+            age_us, axes, flags = max(0, now_us - self._given_us), self._axes, self._flags
             is_late = axes != STILL and age_us > self.hold_s * 1e6
             if is_late:
                 self._axes = axes = STILL
@@ -210,6 +235,9 @@ class HostLink:
         true_us = state.machine_us + self._offset.offset_us if self._offset.is_known else came_us
         with self._lock:
             self._heard = Heard(state, min(true_us, came_us))
+            is_latched = bool(state.flags & StateFlag.STOP_LATCHED)
+            if self._flags is CommandFlag.RELEASE and not is_latched and state.command_session == self._session:
+                self._flags = CommandFlag.NONE  # or a later stop would be released by an old wish
         if state.refusal is not self._refusal:
             self._refusal = state.refusal
             logger.info("the machine says: %s", REFUSAL_WORDS[state.refusal])

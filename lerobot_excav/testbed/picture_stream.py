@@ -7,11 +7,13 @@ slow misses pictures; none is queued.
 
 import contextlib
 import io
+import select
 import socket
 import struct
 import threading
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +22,19 @@ from PIL import Image
 from lerobot_excav.errors import DeviceError
 
 _HEADER = struct.Struct("<QI")
-_LONGEST_NAME = 64
+LONGEST_NAME = 64
 _MOST_BYTES = 50_000_000
 
-Picture = tuple[int, NDArray[np.uint8]]
-"""Clock of the machine at the exposure [us], and the picture (H, W, 3)."""
+_BUFFER_BYTES = 65536  # of the system: more would queue old pictures for who is slow
+_LOOK_EVERY_S = 1.0  # whether a client that waits is still there
+
+
+class Picture(NamedTuple):
+    """A picture (H, W, 3) uint8, the machine's clock at its exposure [us], and when it came [s]."""
+
+    taken_us: int
+    came_s: float
+    pixels: NDArray[np.uint8]
 
 
 class PictureServer:
@@ -36,7 +46,13 @@ class PictureServer:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        self._socket = socket.create_server((host, port))
+        try:
+            self._socket = socket.create_server((host, port))
+        except OSError as error:
+            raise DeviceError(
+                f"--host={host} --picture_port={port} cannot be listened at: {error}; give an address of this computer "
+                "and a free port, 0 for any"
+            ) from error
         self.port: int = self._socket.getsockname()[1]
         self._files: dict[str, tuple[int, bytes]] = {}
         self._change = threading.Condition()
@@ -72,20 +88,25 @@ class PictureServer:
     def _attend(self, client: socket.socket) -> None:
         with contextlib.suppress(OSError), client:
             client.settimeout(5.0)
-            name = client.makefile("rb").readline(_LONGEST_NAME).decode(errors="replace").strip()
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
+            name = client.makefile("rb").readline(LONGEST_NAME).decode(errors="replace").strip()
             last_us = -1
             while True:
                 newer = self._newer(name, last_us)
                 if newer is None:
-                    return
+                    if self._is_over or is_gone(client):
+                        return
+                    continue
                 last_us, data = newer
                 client.sendall(_HEADER.pack(last_us, len(data)) + data)
 
     def _newer(self, name: str, than_us: int) -> tuple[int, bytes] | None:
-        """Wait for a picture of a camera taken at another time; None when all is over."""
+        """Wait a while for a picture of a camera taken at another time; None if none came, or all is over."""
         with self._change:
-            self._change.wait_for(lambda: self._is_over or self._files.get(name, (than_us,))[0] != than_us)
-            return None if self._is_over else self._files[name]
+            is_there = self._change.wait_for(
+                lambda: self._is_over or self._files.get(name, (than_us,))[0] != than_us, _LOOK_EVERY_S
+            )
+            return self._files[name] if is_there and not self._is_over else None
 
 
 class PictureClient:
@@ -94,19 +115,21 @@ class PictureClient:
     Args:
         address: Host and port of the server.
         name: The camera.
-        clock_s: Tells the time.
+        clock_s: Tells the time; that of `Picture.came_s`.
     """
 
-    def __init__(self, address: tuple[str, int], name: str, *, clock_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, address: tuple[str, int], name: str, *, clock_s: Callable[[], float] = time.perf_counter
+    ) -> None:
         self._address, self._name, self._clock_s = address, name, clock_s
         self._change = threading.Condition()
         self._newest: Picture | None = None
-        self._came_s, self._count = 0.0, 0
+        self._count = 0
         self._socket: socket.socket | None = None
 
     @property
     def is_connected(self) -> bool:
-        """Whether it is connected."""
+        """Whether it is connected, and the other side is there."""
         return self._socket is not None
 
     def connect(self, timeout_s: float) -> None:
@@ -120,7 +143,7 @@ class PictureClient:
             self._socket = socket.create_connection(self._address, timeout=timeout_s)
             self._socket.sendall(self._name.encode() + b"\n")
         except OSError as error:
-            self._socket = None
+            self.close()
             raise DeviceError(f"the picture stream at {where} cannot be reached: {error}") from error
         threading.Thread(target=self._listen, args=(self._socket,), name=self._name, daemon=True).start()
         try:
@@ -146,7 +169,7 @@ class PictureClient:
             DeviceError: None came within the last `oldest_s`.
         """
         with self._change:
-            if self._newest is None or self._clock_s() - self._came_s > oldest_s:
+            if self._newest is None or self._clock_s() - self._newest.came_s > oldest_s:
                 raise DeviceError(f"no picture of {self._name!r} came within {oldest_s:.2f} s; is the machine on?")
             return self._newest
 
@@ -171,11 +194,22 @@ class PictureClient:
                 taken_us, size = _HEADER.unpack(_exactly(file, _HEADER.size))
                 if size > _MOST_BYTES:
                     raise ValueError(f"a picture of {size} bytes")
-                picture = np.asarray(Image.open(io.BytesIO(_exactly(file, size))).convert("RGB"))
+                pixels = np.asarray(Image.open(io.BytesIO(_exactly(file, size))).convert("RGB"))
                 with self._change:
-                    self._newest, self._came_s = (taken_us, picture), self._clock_s()
+                    self._newest = Picture(taken_us, self._clock_s(), pixels)
                     self._count += 1
                     self._change.notify_all()
+        with self._change:
+            if self._socket is connection:
+                self._socket = None  # the other side is gone
+            self._change.notify_all()
+        connection.close()
+
+
+def is_gone(client: socket.socket) -> bool:
+    """Tell whether a client, which has nothing more to say, has closed its connection."""
+    ready, _, _ = select.select([client], [], [], 0.0)
+    return bool(ready) and not client.recv(1, socket.MSG_PEEK)
 
 
 def _exactly(file: io.BufferedReader, size: int) -> bytes:

@@ -295,7 +295,6 @@ SCENES = {
     "scenes": whole(1, 100_000),
     "targets": optional(whole(1, 4)),
     "target_rule": one_of("round", "uniform", "nearest").beside(targets=1),
-    "retarget": number(0.0, 1.0),
     "seed": whole(0, SEED),
 }
 GOOD_STAGES = ("0", "19", "0,4,8", "8, 0", "0,1-13", "3-3")
@@ -315,6 +314,7 @@ def is_stage_list(value):
 
 DEMOS = {
     **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
+    "retarget": number(0.0, 1.0),
     "stages": Rule(is_stage_list, GOOD_STAGES + BAD_STAGES, is_text=True),
 }
 WORK = {"workers": whole(0, 1024)}
@@ -438,7 +438,7 @@ CONFIGURATIONS = {
             "dead_man": one_of("always", "gamepad"),
             **dict.fromkeys(("dead_man_device", "dead_man_button"), whole(0, 255)),
             **{"speed_limit": number(high=1, above=0), "ready_timeout_s": number(high=3600, above=0)},
-            "alignment_log": optional(path),
+            **{"alignment_log": optional(path), "release_stop": flag},
         },
         {},
     ),

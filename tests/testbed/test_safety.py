@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from lerobot_excav.testbed.protocol import RATE_HZ, Command, CommandFlag, Refusal
 from lerobot_excav.testbed.safety import GATE_SAMPLES, STALE_S, WATCHDOG_S, Limits, SafetyGate
 
-RANGE = np.array([[-1.0, 1.0]] * 4)
+RANGE, ACCEL = np.array([[-1.0, 1.0]] * 4), np.full(4, 0.5)
 FREE = np.zeros(4)
 TICK_S = 1.0 / RATE_HZ
-FULL = (1.0, -1.0, 0.5, 0.0)
+FULL, STILL = (1.0, -1.0, 0.5, 0.0), (0.0, 0.0, 0.0, 0.0)
 HELD, STOP, RELEASE = CommandFlag.DEAD_MAN, CommandFlag.EMERGENCY_STOP, CommandFlag.RELEASE
 
 
@@ -20,20 +20,22 @@ class Wire:
 
     def __init__(self, **limits):
         self.log = []
-        self.gate = SafetyGate(
-            Limits(joint_range_rad=RANGE, **{"soak_s": 0.0, **limits}), log=lambda refusal: self.log.append(refusal)
-        )
+        limits = Limits(joint_range_rad=RANGE, joint_accel_rad_s2=ACCEL, **{"soak_s": 0.0, **limits})
+        self.gate = SafetyGate(limits, log=self.log.append)
         self.now_s, self.number, self.session = 100.0, 0, 1
+        self.clock_s = 37.0  # by which the host's clock is behind
 
-    def tick(self, axes=(0.0,) * 4, flags=CommandFlag.NONE, *, joint_pos=FREE, age_us=0, is_sent=True):
+    def send(self, axes, flags=CommandFlag.NONE, *, age_us=0, way_s=0.0):
+        self.number += 1
+        host_us = round((self.now_s - way_s - self.clock_s) * 1e6)
+        numbers = {"session": self.session, "number": self.number, "host_us": host_us, "age_us": age_us}
+        return self.gate.hear(Command(axes=axes, flags=flags, **numbers), self.now_s)
+
+    def tick(self, axes=STILL, flags=CommandFlag.NONE, *, joint_pos=FREE, joint_vel=FREE, is_sent=True, **sent):
         self.now_s += TICK_S
         if is_sent:
-            self.number += 1
-            self.gate.hear(
-                Command(session=self.session, number=self.number, host_us=0, axes=axes, age_us=age_us, flags=flags),
-                self.now_s,
-            )
-        return self.gate.tick(np.asarray(joint_pos, float), self.now_s, TICK_S)
+            self.send(axes, flags, **sent)
+        return self.gate.tick(np.asarray(joint_pos, float), np.asarray(joint_vel, float), self.now_s, TICK_S)
 
     def armed(self):
         for _ in range(GATE_SAMPLES + 1):
@@ -102,7 +104,7 @@ def test_datagrams_that_come_twice_or_late_change_nothing():
     for number in (1, wire.number):
         late = Command(session=1, number=number, host_us=0, axes=(-1.0,) * 4, flags=HELD)
         assert not wire.gate.hear(late, wire.now_s)
-    assert wire.gate.tick(FREE, wire.now_s, TICK_S).axes == FULL
+    assert wire.gate.tick(FREE, FREE, wire.now_s, TICK_S).axes == FULL
 
 
 def test_nothing_moves_until_thirty_seconds_of_zero_commands_have_been_watched_once():
@@ -124,11 +126,41 @@ def test_the_emergency_stop_latches_until_it_is_released_with_everything_let_go(
     assert wire.tick(FULL, HELD | STOP).axes == (0.0,) * 4
     for flags in (HELD, CommandFlag.NONE, HELD | RELEASE):
         assert wire.tick(FULL, flags).refusal is Refusal.EMERGENCY_STOP
-    wire.session, wire.number = 9, 0  # a new host does not release it either
+    wire.session, wire.number = 9, 0  # a host that starts again does not release it either
     assert wire.tick().refusal is Refusal.EMERGENCY_STOP
     assert wire.tick(FULL, RELEASE).refusal is Refusal.EMERGENCY_STOP
     assert wire.tick(flags=RELEASE).refusal is Refusal.START_GATE
     assert wire.armed().tick(FULL, HELD).axes == FULL
+
+
+def test_a_release_that_was_asked_for_before_the_stop_does_not_release_it():
+    wire = Wire().armed()
+    for _ in range(5):
+        wire.tick(flags=RELEASE)
+    wire.gate.is_stopped = True  # by a switch on the machine itself
+    wire.send(STILL, STOP | RELEASE)
+    for _ in range(50):
+        assert wire.tick(flags=RELEASE).refusal is Refusal.EMERGENCY_STOP
+    wire.tick()
+    assert wire.tick(flags=RELEASE).refusal is not Refusal.EMERGENCY_STOP
+
+
+@pytest.mark.parametrize(("late_s", "moves"), [(0.1, True), (0.2, False), (2.0, False)])
+def test_a_command_that_was_under_way_for_longer_than_others_is_stale(late_s, moves):
+    wire = Wire().armed()
+    assert wire.tick(FULL, HELD, way_s=0.05).axes == FULL
+    assert (wire.tick(FULL, HELD, way_s=late_s).axes == FULL) is moves
+    assert wire.tick(FULL, HELD).axes == FULL
+
+
+def test_clocks_that_drift_apart_do_not_make_commands_stale():
+    wire = Wire().armed()
+    for _ in range(5 * 60 * RATE_HZ):
+        wire.clock_s += 2e-4 * TICK_S  # four times the drift of a bad crystal, each way
+        verdict = wire.tick(FULL, HELD)
+    assert verdict.refusal is Refusal.NONE
+    wire.clock_s -= 0.1
+    assert wire.tick(FULL, HELD).refusal is Refusal.NONE
 
 
 def test_the_machine_is_never_faster_than_allowed():
@@ -152,6 +184,37 @@ def test_at_its_limit_a_joint_moves_back_only_and_the_others_move_on(axis, side)
     assert wire.tick(tuple(out), HELD, joint_pos=joint_pos).axes == tuple(out)
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_fast_joint_is_stopped_before_its_limit_so_that_it_can_brake(side):
+    wire = Wire().armed()
+    told, joint_vel = (side, 0.0, 0.0, 0.0), np.array([0.8 * side, 0.0, 0.0, 0.0])  # brakes for 0.64 rad
+    for at, moves in ((0.2, True), (0.3, True), (0.4, False)):
+        verdict = wire.tick(told, HELD, joint_pos=[at * side, 0.0, 0.0, 0.0], joint_vel=joint_vel)
+        assert (verdict.axes == told) is moves, at
+    back = tuple(-value for value in told)
+    assert wire.tick(back, HELD, joint_pos=[0.9 * side, 0.0, 0.0, 0.0], joint_vel=joint_vel).axes == back
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("told", [-1.0, 1.0])
+def test_a_joint_whose_sensor_gives_no_number_stands_still(value, told):
+    wire, joint_pos = Wire().armed(), np.zeros(4)
+    joint_pos[2] = value
+    verdict = wire.tick((told, told, told, 0.0), HELD, joint_pos=joint_pos)
+    assert verdict.axes == (told, told, 0.0, 0.0)
+    assert verdict.refusal is Refusal.JOINT_LIMIT
+
+
+def test_a_stick_that_moves_between_two_ticks_begins_the_soak_again():
+    wire = Wire(soak_s=1.0)
+    for _ in range(40):
+        wire.tick()
+    for axes in (FULL, STILL):
+        wire.send(axes)
+    for _ in range(45):
+        assert wire.tick().refusal is Refusal.SOAK
+
+
 def test_every_change_of_the_reason_is_logged_once():
     wire = Wire().armed()
     for _ in range(5):
@@ -167,11 +230,12 @@ STEPS = st.tuples(
 
 @given(st.lists(STEPS, max_size=60))
 def test_whatever_comes_it_moves_only_when_armed_held_fresh_and_not_stopped(steps):
-    wire = Wire()
-    wire.armed()
+    wire, silent_s = Wire().armed(), 0.0
     for axes, flags, age_us, is_sent in steps:
         verdict = wire.tick(axes, CommandFlag(flags), age_us=age_us, is_sent=is_sent)
+        silent_s = 0.0 if is_sent else silent_s + TICK_S
         if any(verdict.axes):
+            assert silent_s + 1e-6 * wire.gate.command.age_us <= STALE_S + 1e-9
             assert wire.gate.is_armed
             assert not wire.gate.is_stopped
             assert wire.gate.command.flags & HELD

@@ -1,6 +1,5 @@
 """The stream camera itself."""
 
-import time
 from typing import Any, override
 
 import numpy as np
@@ -16,7 +15,7 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
     """Has the newest picture that came over the network.
 
     Attributes:
-        latest_timestamp: When the picture that was read last had come, by `time.perf_counter` [s].
+        latest_timestamp: When the picture that was read last came, by `time.perf_counter` [s].
         taken_us: When it was taken, by the machine's clock [us].
     """
 
@@ -48,7 +47,7 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         self._client.connect(self.config.timeout_s)
         try:
             self.read_latest(round(1e3 * self.config.timeout_s))
-        except ConfigurationError:
+        except (ConfigurationError, DeviceError):
             self._client.close()
             raise
 
@@ -68,14 +67,14 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
 
     @override
     def async_read(self, timeout_ms: float = 200.0) -> NDArray[np.uint8]:
-        """Return the newest picture, (H, W, 3), at most as old as `timeout_s`.
+        """Return the newest picture, (H, W, 3), that came within the last `max_age_s`.
 
         It does not wait for a new one: the robot measures how old it is.
 
         Raises:
-            DeviceError: It is older.
+            DeviceError: None came: whoever went on would drive blind.
         """
-        return self._noted(self._client.newest(self.config.timeout_s))
+        return self._noted(self._client.newest(self.config.max_age_s))
 
     @override
     def read_latest(self, max_age_ms: int = 500) -> NDArray[np.uint8]:
@@ -89,11 +88,11 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
     def _noted(self, newest: Picture) -> NDArray[np.uint8]:
         if not self.is_connected:
             raise DeviceError(f"the stream camera {self.config.name!r} is not connected; call connect() first")
-        taken_us, picture = newest
-        if picture.shape[:2] != (self.config.height, self.config.width):
+        size = newest.pixels.shape[:2]
+        if size != (self.config.height, self.config.width):
             raise ConfigurationError(
-                f"the stream camera {self.config.name!r} gives {picture.shape[:2]}, and was set up for "
+                f"the stream camera {self.config.name!r} gives {size}, and was set up for "
                 f"{(self.config.height, self.config.width)} (height, width); give it the machine's size"
             )
-        self.taken_us, self.latest_timestamp = taken_us, time.perf_counter()
-        return picture.copy()
+        self.taken_us, self.latest_timestamp = newest.taken_us, newest.came_s
+        return newest.pixels.copy()

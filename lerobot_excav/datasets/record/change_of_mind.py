@@ -7,7 +7,8 @@ import numpy as np
 from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
-from lerobot_excav.envs.tasks.task import Operator
+from lerobot_excav.envs.tasks.task import Operator, TaskSpec
+from lerobot_excav.errors import require
 
 _STREAM = 0x7E3B  # names these random streams, so that the operator draws the same with and without changes of mind
 
@@ -51,3 +52,17 @@ class ChangeOfMind:
             return env.recommand(target_id)
         except MaskMissingError:
             return None
+
+
+def require_approach(spec: TaskSpec) -> None:
+    """Check that the operator of a task tells how long it is on its way.
+
+    Raises:
+        ConfigurationError: It does not.
+    """
+    operator = type(spec.make_operator(np.random.default_rng(0)))
+    require(
+        hasattr(operator, "approach_s"),
+        f"--retarget needs to know how long the operator of {spec.id} is on its way, and {operator.__name__} has no "
+        "approach_s; add the property (docs/how-to/add-a-task.md), or leave --retarget out",
+    )

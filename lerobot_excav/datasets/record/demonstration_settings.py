@@ -46,13 +46,6 @@ class PlayedScenes:
         default="round",
         choices=TARGET_RULES,
     )
-    retarget: float = setting(
-        "Share of the episodes with a change of mind: another target is commanded at a moment drawn from those before "
-        "the operator would touch the first",
-        default=0.0,
-        low=0.0,
-        high=1.0,
-    )
     seed: int = setting(
         "Seed of the operator's variations, of drawn targets and of changes of mind", default=0, low=0, high=2**63 - 1
     )
@@ -82,11 +75,6 @@ class PlayedScenes:
         require(
             self.episode_length <= MOST_FRAMES,
             f"--env.episode_length={self.episode_length} is too long to be kept; give a number up to {MOST_FRAMES}",
-        )
-        require(
-            self.retarget == 0.0 or (spec.default_target is None and getattr(self.env, "retarget_frame", None) is None),
-            f"--retarget={self.retarget} has no meaning for {spec.id} with these settings: the task itself says when "
-            "the command changes; leave it out",
         )
         for name in spec.settings.columns():
             value = getattr(self.env, name)
@@ -163,6 +151,13 @@ class DemonstrationSettings(PlayedScenes):
         default=None,
         choices=STORAGES,
     )
+    retarget: float = setting(
+        "Share of the episodes with a change of mind: another target is commanded at a moment drawn from those before "
+        "the operator would touch the first",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+    )
     keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
     stages: str = setting(
         "Stages at which every scene is shown, such as 0,4,8: after so many cycles that a seeded operator has dug "
@@ -174,6 +169,12 @@ class DemonstrationSettings(PlayedScenes):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.storage = self.storage or self.task_spec.storage
+        require(
+            self.retarget == 0.0
+            or (self.task_spec.default_target is None and getattr(self.env, "retarget_frame", None) is None),
+            f"--retarget={self.retarget} has no meaning for {self.task_spec.id} with these settings: the task itself "
+            "says when the command changes; leave it out",
+        )
         self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
 
     @property
@@ -227,6 +228,7 @@ class DemonstrationSettings(PlayedScenes):
             f"{source} is of version {version} of the simulation, and this is version {current}; "
             "choose another --out, or install the release of lerobot_env_excav that began it",
         )
+        values.setdefault("retarget", 0.0)  # recorded before there were changes of mind
         known = set(declared_settings(cls))
         env = {name.removeprefix("env."): values.pop(name) for name in list(values) if name.startswith("env.")}
         unlike = sorted(values.keys() ^ known)

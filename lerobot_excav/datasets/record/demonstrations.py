@@ -18,6 +18,7 @@ from PIL import UnidentifiedImageError
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.pairs.paired_index import write_index
+from lerobot_excav.datasets.record.change_of_mind import require_approach
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.datasets.record.partial_run import PartialRun
@@ -74,6 +75,8 @@ def record_demonstrations(
     """
     require_workers(workers)
     settings.env.require_commanded_mask()
+    if settings.retarget:
+        require_approach(settings.task_spec)
     start = time.monotonic()
     if out.exists() or out.is_symlink():  # a folder cannot take the place of a link that leads nowhere
         outcomes = _require_finished(out, settings, resume=resume)

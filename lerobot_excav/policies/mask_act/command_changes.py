@@ -1,5 +1,6 @@
 """Changes of mind in the data: actions after a new command are no part of a plan made under the old one."""
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from torch import Tensor
 
 from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.policies.mask_act.views import Batch
+
+LOG = logging.getLogger(__name__)
 
 COMMAND_KEY = "excav.command_frame"
 """Column of a dataset: the frame of the episode from which on its command holds."""
@@ -70,7 +73,14 @@ def frames_left_of(meta: LeRobotDatasetMetadata) -> NDArray[np.int32]:
     """Return `frames_under_command` of every frame of a dataset, by its `index`; those of files elsewhere are 0."""
     columns = ["index", "episode_index", COMMAND_KEY]
     frames_left = np.zeros(meta.total_frames, np.int32)
-    for path in sorted((meta.root / "data").rglob("*.parquet")):  # an episode lies in one file
+    paths = sorted((meta.root / "data").rglob("*.parquet"))  # an episode lies in one file
+    if not paths:
+        LOG.warning(
+            "%s is not on this machine, so nothing says where commands change; if they do within episodes, actions "
+            "after a change are learnt under the mask before it. Train on a copy of the dataset that is here.",
+            meta.root / "data",
+        )
+    for path in paths:
         index, episode, command_frame = (column.to_numpy().ravel() for column in pq.read_table(path, columns=columns))
         if index.size and not 0 <= index.min() <= index.max() < meta.total_frames:
             raise DatasetError(

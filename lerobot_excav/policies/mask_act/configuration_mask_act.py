@@ -96,7 +96,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     )
     augment_mask_px: int = setting(
         "In training, move the mask alone by up to this much along each axis, drawn for each sample: the policy learns "
-        "to forgive masks that lie beside their target [px]",
+        "to forgive masks that lie beside their target [px of the dataset's pictures]",
         default=0,
         low=0,
         high=1024,
@@ -343,6 +343,10 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 f"policy.{name}={value} would move {self.main_camera_key} of shape {main_shape} "
                 f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
             )
+        require(
+            not (self.augment_mask_px and self.withhold_mask),
+            f"policy.augment_mask_px={self.augment_mask_px} has no effect with policy.withhold_mask=true; leave it out",
+        )
         require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:

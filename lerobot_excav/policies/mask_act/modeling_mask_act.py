@@ -122,7 +122,9 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
                 one that the dataset holds.
         """
         require_choice("reduction", reduction, ("mean", "none"))
-        demonstration = Demonstration(batch[ACTION], self._command_changes.is_pad(batch))
+        # Other batches may be of another dataset, with frames of the same numbers.
+        is_pad = self._command_changes.is_pad(batch) if self.training else batch["action_is_pad"]
+        demonstration = Demonstration(batch[ACTION], is_pad)
         mask = target_mask(self.config, batch, is_training=True)
         if self.training:
             self._training_masks.check(batch, mask)
@@ -180,7 +182,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
             picture, mask = shift_together(batch[main], mask, shift_px)
             batch = {**batch, main: picture}
         if mask_px := self.config.augment_mask_px:
-            mask = shift_alone(mask, mask_px)
+            mask = shift_alone(mask, mask_px, self.config.crop)
         return batch, mask
 
     def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:

@@ -5,7 +5,10 @@ answer late. So every frame is measured, and those that break a limit are marked
 
     {"excavator_testbed": "alignment", "image_limit_ms": 120, "state_limit_ms": 100}
     {"episode_index": 0, "frame_index": 12, "image_age_ms": 84.1, "state_age_ms": 9.8, "refusal": "NONE",
-     "is_causal": true}
+     "is_causal": true, "is_as_told": true}
+
+LeRobot records the action as it came. `is_as_told` is false where the machine did something else: it stood still for a
+reason of its own, or the action was faster than allowed. Do not train on such frames.
 """
 
 from dataclasses import dataclass
@@ -36,21 +39,23 @@ class AlignmentLog:
     """Writes the ages of every frame down; between episodes nothing is noted.
 
     Attributes:
-        frames: Frames that were noted.
+        frames: Frames that were written since the log was started.
         late_frames: How many of them broke a limit.
+        other_frames: In how many of them the machine did not do what the action says.
 
     Raises:
         DeviceError: From every method: the file cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path, self.frames, self.late_frames = path, 0, 0
+        self.path, self.frames, self.late_frames, self.other_frames = path, 0, 0, 0
         self._journal = Journal(path, mark='"excavator_testbed": "alignment"')
         self._episode: int | None = None
         self._frame = 0
 
     def start(self) -> None:
         """Open the file."""
+        self.frames = self.late_frames = self.other_frames = 0
         try:
             self._journal.start()
             limits = {"image_limit_ms": IMAGE_LIMIT_MS, "state_limit_ms": STATE_LIMIT_MS}
@@ -66,12 +71,13 @@ class AlignmentLog:
         """End it."""
         self._episode = None
 
-    def note(self, ages: Ages, refusal: str) -> None:
+    def note(self, ages: Ages, refusal: str, *, is_as_told: bool) -> None:
         """Note a frame."""
-        self.frames += 1
-        self.late_frames += not ages.is_causal
         if self._episode is None:
             return
+        self.frames += 1
+        self.late_frames += not ages.is_causal
+        self.other_frames += not is_as_told
         image_ms = None if ages.image_ms is None else round(ages.image_ms, 2)
         record = {
             "episode_index": self._episode,
@@ -80,6 +86,7 @@ class AlignmentLog:
             "state_age_ms": round(ages.state_ms, 2),
             "refusal": refusal,
             "is_causal": ages.is_causal,
+            "is_as_told": is_as_told,
         }
         self._frame += 1
         try:

@@ -38,6 +38,9 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
         above=0.0,
         high=1.0,
     )
+    release_stop: bool = setting(
+        "Whether connecting releases an emergency stop that is latched; look at the machine first", default=False
+    )
     ready_timeout_s: float = setting(
         "How long to wait until the machine is ready: its soak of 30 s, and a person who lets go of everything [s]",
         default=120.0,

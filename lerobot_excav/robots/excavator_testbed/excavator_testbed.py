@@ -51,6 +51,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         self.cameras = make_cameras_from_configs(config.cameras)
         self.link: HostLink | None = None
         self._heard: Heard | None = None
+        self._taken_us: list[int] = []  # when what was observed last was taken
         path = config.alignment_log or default_path(f"{self.name}_alignment", datetime.now())
         self._log = AlignmentLog(path)
         self._phases = RecordingPhases(
@@ -93,11 +94,11 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         """
         if self.link is not None:
             raise DeviceError(f"the robot {self.name} is connected already; call disconnect() first.")
-        self._log.start()
         link = HostLink(self.config.host_and_port, dead_man=self._dead_man(), hold_s=STALE_S)
-        link.connect()
-        self.link = link
         try:
+            self._log.start()
+            link.connect()
+            self.link = link
             self._wait_until_ready(link)
             for camera in self.cameras.values():
                 camera.connect()
@@ -116,11 +117,13 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         self._opened()
         logging.getLogger().removeHandler(self._phases)
         self._close()
-        if self._log.late_frames:
-            logger.warning(
-                "in %d of %d frames pictures or state were too old beside the action; %s says in which",
-                *(self._log.late_frames, self._log.frames, self._log.path),
-            )
+        log = self._log
+        for count, words in (
+            (log.late_frames, "pictures or state were too old beside the action"),
+            (log.other_frames, "the machine did not do what the action says"),
+        ):
+            if count:
+                logger.warning("in %d of %d recorded frames %s; %s says in which", count, log.frames, words, log.path)
 
     def get_observation(self) -> dict[str, Any]:
         """Return state and pictures as they are now.
@@ -128,9 +131,14 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         Raises:
             DeviceError: The robot is not connected, the machine is not heard any more, or a camera fails.
         """
-        self._heard = heard = self._opened().heard()
+        link = self._opened()
+        self._heard = heard = link.heard()
         values = (*heard.state.joint_pos, *heard.state.joint_vel)
-        pictures = {name: camera.async_read() for name, camera in self.cameras.items()}
+        pictures, taken_us = {}, []
+        for name, camera in self.cameras.items():
+            pictures[name] = camera.async_read()
+            taken_us.append(_taken_us(camera, link))  # now: cameras go on meanwhile
+        self._taken_us = [at_us for at_us in taken_us if at_us is not None]
         return {**dict(zip(STATE_NAMES, values, strict=True)), **pictures}
 
     def send_action(self, action: Mapping[str, Any]) -> dict[str, Any]:
@@ -144,13 +152,15 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         """
         link = self._opened()
         limit = self.config.speed_limit
-        told = np.clip(command_from_action(action, ACTION_NAMES), -limit, limit)
+        wanted = command_from_action(action, ACTION_NAMES)
+        told = np.clip(wanted, -limit, limit)
         refusal = Refusal.NOT_HEARD if self._heard is None else self._heard.state.refusal
         is_ready = refusal not in NOT_READY
         link.let_go(lets_go=not is_ready and self.config.dead_man == "always")
         swing, boom, arm, bucket = map(float, told) if is_ready else STILL
         link.give((swing, boom, arm, bucket))
-        self._log.note(self._ages(), refusal.name)
+        is_as_told = refusal is Refusal.NONE and bool((np.abs(wanted - (swing, boom, arm, bucket)) < 1e-6).all())
+        self._log.note(self._ages(), refusal.name, is_as_told=is_as_told)
         return dict(zip(ACTION_NAMES, (swing, boom, arm, bucket), strict=True))
 
     def stop(self) -> None:
@@ -185,21 +195,23 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             if state.flags & StateFlag.ARMED:
                 link.let_go(lets_go=False)
                 return
+            if self.config.release_stop and state.flags & StateFlag.STOP_LATCHED:
+                link.release()
             why = REFUSAL_WORDS[state.refusal]
             if time.monotonic() - words_s > _WORDS_EVERY_S:
                 words_s = time.monotonic()
                 logger.info("waiting for the machine: %s", why)
         raise DeviceError(
             f"the machine at {self.config.address} is not ready after {self.config.ready_timeout_s:.0f} s: {why}. Let "
-            "go of sticks and dead-man, release its emergency stop, and check address and cable"
+            "go of sticks and dead-man, give --robot.release_stop=true if its emergency stop is latched and all is "
+            "well, and check address and cable"
         )
 
     def _ages(self) -> Ages:
         """Return how old what was observed last is now."""
-        link, now_us = self._opened(), time.perf_counter_ns() // 1000
-        taken = [at_us for camera in self.cameras.values() if (at_us := _taken_us(camera, link)) is not None]
+        now_us = time.perf_counter_ns() // 1000
         state_us = now_us if self._heard is None else self._heard.true_us
-        image_ms = (now_us - min(taken)) * 1e-3 if taken else None
+        image_ms = (now_us - min(self._taken_us)) * 1e-3 if self._taken_us else None
         return Ages(image_ms=image_ms, state_ms=(now_us - state_us) * 1e-3)
 
     def _close(self) -> None:

@@ -4,6 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from toy_reach.operator import ReachOperator
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.pairs.paired_index import build_index
@@ -32,7 +33,7 @@ def test_the_operator_obeys_the_second_command_and_succeeds(env_type):
     settings = settings_of(env_type)
     first_frames = set()
     for pair in settings.pairs()[::3]:
-        episode = play_demonstration(settings, pair, with_images=False)
+        episode = play_demonstration(settings, pair, with_images=False, retarget=1.0)
         (start, first), (changed, second) = commands(episode)
         assert (start, first) == (0, pair.target_id)
         assert second != first
@@ -50,7 +51,7 @@ def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below):
     settings = settings_of(env_type)
     column = settings.task_spec.task_state_names.index(name)
     for pair in settings.pairs()[1:4]:
-        episode = play_demonstration(settings, pair, with_images=False)
+        episode = play_demonstration(settings, pair, with_images=False, retarget=1.0)
         changed = int(episode.command_frame[-1])
         assert episode.task_state[: changed + 1, column].max() < below
 
@@ -59,10 +60,12 @@ def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as
     drawn = [ChangeOfMind.drawn(0.3, (7, scene, 0)) is not None for scene in range(1000)]
     assert 0.25 < np.mean(drawn) < 0.35
     assert ChangeOfMind.drawn(0.0, (7, 0, 0)) is None
-    without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
+    settings = settings_of("toy_reach")
     same = [
-        np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
-        for pair in without.pairs()
+        np.array_equal(
+            *(play_demonstration(settings, pair, with_images=False, retarget=share).action for share in (0.0, 0.5))
+        )
+        for pair in settings.pairs()
     ]
     assert 0 < sum(same) < len(same)
 
@@ -102,3 +105,17 @@ def test_a_target_that_the_mask_source_does_not_find_leaves_the_command_as_it_wa
 def test_where_the_task_itself_changes_the_command_it_is_refused(env_type, env):
     with pytest.raises(ConfigurationError, match=r"--retarget=0\.5 has no meaning for .*; leave it out"):
         DemonstrationSettings.of(env_type, env, retarget=0.5)
+
+
+def test_an_operator_that_does_not_tell_its_way_is_named_before_anything_is_recorded(monkeypatch, tmp_path):
+    monkeypatch.delattr(ReachOperator, "approach_s")
+    with pytest.raises(ConfigurationError, match=r"ReachOperator has no approach_s; add the property"):
+        record_demonstrations(settings_of("toy_reach"), tmp_path / "d", workers=0, show_progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_was_started_before_there_were_changes_of_mind_goes_on(tmp_path):
+    settings = settings_of("toy_reach", retarget=0.0)
+    record = settings.as_record()
+    assert record.pop("retarget") == 0.0
+    assert DemonstrationSettings.from_record(record, source=tmp_path) == settings

@@ -70,6 +70,13 @@ def test_without_the_column_or_without_changes_padding_is_as_lerobot_says(datase
     assert CommandChanges(meta).is_pad({"action_is_pad": is_pad}) is is_pad
 
 
+def test_a_dataset_that_is_elsewhere_is_warned_of(dataset, tmp_path, caplog):
+    meta, _ = described(dataset, root=tmp_path)
+    is_pad = torch.zeros(2, 5, dtype=torch.bool)
+    assert CommandChanges(meta).is_pad({"action_is_pad": is_pad}) is is_pad
+    assert "nothing says where commands change" in caplog.text
+
+
 def test_batches_that_do_not_say_their_frames_and_damaged_datasets_are_refused(dataset):
     meta, _ = described(dataset)
     with pytest.raises(ConfigurationError, match="keep index in the batches"):
@@ -80,7 +87,7 @@ def test_batches_that_do_not_say_their_frames_and_damaged_datasets_are_refused(d
 
 
 def test_the_loss_leaves_later_commands_out(policy, batch, dataset):
-    agent, data = policy(), batch(actions=True)
+    agent, data = policy(dropout=0.0).train(), batch(actions=True)
     size, chunk = data["action_is_pad"].shape
     data["action_is_pad"][:] = False
     agent._command_changes._frames_left = torch.full((size,), 1, dtype=torch.int32)
@@ -88,5 +95,6 @@ def test_the_loss_leaves_later_commands_out(policy, batch, dataset):
     changed = {**data, "index": torch.arange(size), "action": data["action"].clone()}
     changed["action"][:, 1:] += 100.0
     assert torch.equal(agent.forward(changed)[0], first)
-    agent._command_changes._frames_left[:] = chunk
+    assert agent.eval().forward(changed)[0] > first + 10.0  # a validation set has frames of the same numbers
+    agent.train()._command_changes._frames_left[:] = chunk
     assert agent.forward(changed)[0] > first + 10.0

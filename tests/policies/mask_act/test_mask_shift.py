@@ -33,6 +33,19 @@ def test_a_mask_that_would_leave_the_picture_stays():
     assert (moved[:, 0, 0, 0] == 0).any()
 
 
+def test_a_mask_that_would_leave_the_crop_stays():
+    mask = torch.zeros(400, 1, 12, 16)
+    mask[:, :, 4, 4] = 1.0
+    moved = shift_alone(mask, 3, [4, 4, 6, 6])
+    assert (moved[:, :, 4:10, 4:10].flatten(1).sum(dim=1) == 1.0).all()
+    assert (shift_alone(mask, 3)[:, :, 4:10, 4:10].flatten(1).sum(dim=1) == 0.0).any()
+
+
+def test_it_has_no_effect_without_a_mask_and_says_so(policy):
+    with pytest.raises(ConfigurationError, match=r"augment_mask_px=2 has no effect with policy\.withhold_mask=true"):
+        policy(augment_mask_px=2, withhold_mask=True)
+
+
 def test_only_the_mask_moves_in_training_only_and_the_seed_decides(policy, batch, monkeypatch):
     agent, still, data = policy(augment_mask_px=4), policy(), batch(actions=True)
     assert torch.equal(agent.forward(data)[0], still.forward(data)[0])  # validation

@@ -61,7 +61,7 @@ def _legend(operator: str | None) -> list[str]:
 SCOOP_MEASURES = TaskMeasures(
     record=ScoopRecord,
     settings={"soil": "soils", "fidelity": "fidelities"},
-    shared={},
+    shared={"changes": "times at which the command changes"},
     setting={"soil": "soil", "mask": "mask"},
     columns=(
         Column(key="target_success", header="target success [%]", kind=Kind.RATE, field="target_success"),
