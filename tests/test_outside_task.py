@@ -119,7 +119,6 @@ def test_a_source_from_outside_serves_recordings_too(run, tmp_path):
     out = tmp_path / "d"
     run(*excav("demos", "--env.type=toy_reach", "--env.mask_source=by_colour", "--env.observation_height=32",
                "--env.observation_width=48", "--scenes=1", "--workers=1", f"--out={out}"))  # fmt: skip
-    run(*excav("qc", out, "--replays=1"))
     assert set(pd.read_parquet(out / "meta" / "excav_pairs.parquet")["mask_source"]) == {"by_colour"}
 
 

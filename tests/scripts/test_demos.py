@@ -47,6 +47,7 @@ def whole(env_type, tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("env_type", ["fr5_grasp"], indirect=True)  # the one whose commands change
 def test_a_killed_run_continues_to_the_same_dataset_with_other_workers(env_type, whole, tmp_path):
     out = tmp_path / "killed"
     command = [sys.executable, "-m", "lerobot_excav.scripts.main", "demos", *OPTIONS[env_type], f"--out={out}"]
