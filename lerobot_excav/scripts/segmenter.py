@@ -25,7 +25,7 @@ import numpy as np
 
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
-from lerobot_excav.errors import DatasetError, require, require_choice
+from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.scripts.arguments import Arguments
 from lerobot_excav.setting import setting
 
@@ -51,8 +51,12 @@ class SegmenterArguments(Arguments):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in self.names:
-            require_choice("--env_types", name, tuple(env_types()))
+        known = tuple(env_types())
+        require(
+            all(name in known for name in self.names),
+            f"--env_types={self.env_types!r} is not a list of environments; allowed, parted by commas: "
+            f"{', '.join(known)}",
+        )
         require(
             self.out is None or self.model is None,
             f"--model={self.model} is measured where nothing is trained; leave --out={self.out} or --model out",

@@ -386,7 +386,11 @@ COMMAND_TABLES = {
     "testbed-emulator": {
         "host": text,
         **dict.fromkeys(("port", "picture_port"), whole(0, 65535)),
-        **{"first_scene": whole(0, ENDLESS), "pictures_hz": one_of(1, 2, 5, 10, 25, 50), "seed": whole(0, SEED)},
+        **{
+            "first_scene": whole(0, ENDLESS),
+            "pictures_hz": whole(1, 50, only=(1, 2, 5, 10, 25, 50)),
+            "seed": whole(0, SEED),
+        },
         **{"soak_s": number(0, 3600), "speed_limit": number(high=1, above=0)},
         **{"valve_lag_s": number(0, 5), "valve_dead_zone": number(0, below=1), "joint_noise_rad": number(0, 1)},
         **dict.fromkeys(("loss", "duplicates"), number(0, 1)),
@@ -418,6 +422,7 @@ SOIL_TABLE = {
     "penetration_scale": number(0, 100),
 }
 
+cameras = Rule(lambda v: isinstance(v, dict) and not v, ({},))  # LeRobot's own; those of this package check themselves
 ADDRESSES = ("127.0.0.1:47500", "127.9.9.9:1")  # of this computer, or somebody has to hold the dead-man
 NO_ADDRESSES = ("", "machine", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:²", "10.0.0.7:47500", "::1:9")
 
@@ -434,7 +439,8 @@ CONFIGURATIONS = {
     "excavator_testbed": (
         ExcavatorTestbedConfig,
         {
-            "address": Rule(lambda v: v in ADDRESSES, (*ADDRESSES, *NO_ADDRESSES)),
+            "cameras": cameras,
+            "address": Rule(lambda v: isinstance(v, str) and v in ADDRESSES, (*ADDRESSES, *NO_ADDRESSES)),
             "dead_man": one_of("always", "gamepad"),
             **dict.fromkeys(("dead_man_device", "dead_man_button"), whole(0, 255)),
             **{"speed_limit": number(high=1, above=0), "ready_timeout_s": number(high=3600, above=0)},

@@ -32,7 +32,7 @@ def test_a_network_is_trained_written_and_measured_and_the_seed_decides(tmp_path
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--env_types=excavator,arm"], "--env_types='arm'"),
+        (["--env_types=excavator,arm"], "--env_types='excavator,arm' is not a list of environments"),
         (["--out=a.safetensors", "--model=b.safetensors"], "leave --out=a.safetensors or --model out"),
         (["--out=a.safetensors", "--scene_set=train"], "would measure on what was learned"),
         (["--model=nowhere.safetensors"], "model=nowhere.safetensors holds no click segmenter"),

@@ -16,6 +16,7 @@ from lerobot_excav.policies.mask_act.features import (
     check_features,
     check_normalization,
     require_mask_shape,
+    require_moved_mask,
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
@@ -343,10 +344,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 f"policy.{name}={value} would move {self.main_camera_key} of shape {main_shape} "
                 f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
             )
-        require(
-            not (self.augment_mask_px and self.withhold_mask),
-            f"policy.augment_mask_px={self.augment_mask_px} has no effect with policy.withhold_mask=true; leave it out",
-        )
+        require_moved_mask(self.augment_mask_px, withheld=self.withhold_mask)
         require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:

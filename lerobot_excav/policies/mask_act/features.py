@@ -81,3 +81,11 @@ def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str
         f"its shape must be {allowed[0]} or {allowed[1]} (channels, height, width). Render both at one size, or set "
         "--policy.main_camera to the camera that the mask belongs to.",
     )
+
+
+def require_moved_mask(augment_mask_px: int, *, withheld: bool) -> None:
+    """Raise `ConfigurationError` if a mask is to be moved in training that is withheld."""
+    require(
+        not (augment_mask_px and withheld),
+        f"policy.augment_mask_px={augment_mask_px} has no effect with policy.withhold_mask=true; leave it out",
+    )
