@@ -105,6 +105,11 @@ class PlayedScenes:
         return draw_stages(self.listed_stages, self.seed, SCENE_SETS.index(self.env.scene_set), scene_id)
 
     @property
+    def retarget_share(self) -> float:
+        """Share of the episodes with a change of mind."""
+        return 0.0
+
+    @property
     def episode_count(self) -> int:
         """How many episodes are to be played."""
         return self.scenes * len(self.listed_stages) * (self.targets or 1)  # it has been filled in
@@ -181,6 +186,11 @@ class DemonstrationSettings(PlayedScenes):
     def listed_stages(self) -> tuple[range, ...]:
         """What the stages of a scene are drawn from: one of each range, which may hold a single one; rising."""
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
+
+    @property
+    def retarget_share(self) -> float:
+        """Share of the episodes with a change of mind."""
+        return self.retarget
 
     def possible_pairs(self) -> list[Pair]:
         """Return the episodes that may be played, whichever targets the rule chooses."""

@@ -59,7 +59,7 @@ def simulate_episodes(settings: DemonstrationSettings, pair: Pair, folder: Path)
 def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) -> Outcome:
     """Play one episode, store it in the folder of finished ones, and return its outcome; note it if there is none."""
     try:
-        episode = play_demonstration(settings, pair, retarget=settings.retarget)
+        episode = play_demonstration(settings, pair)
     except TargetAbsentError:
         return EpisodeStore(folder).write_absent(pair)
     # An episode that waited for its mask has frames that no action led to: it could not be played again.
@@ -67,17 +67,15 @@ def simulate_episode(settings: DemonstrationSettings, pair: Pair, folder: Path) 
     return EpisodeStore(folder).write(episode, keep_frames=keep)
 
 
-def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = True, retarget: float = 0.0) -> Episode:
+def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = True) -> Episode:
     """Play one episode with the scripted operator; the same arguments give the same episode.
-
-    With probability `retarget` it has a change of mind.
 
     The environment stays open for the next call with the same settings. Without pictures it is several times faster.
     """
     env = open_environment(played.env, with_images=with_images)
     seed = played.episode_seed(pair)
     operator = played.task_spec.make_operator(np.random.default_rng(seed))
-    return demonstrate(env, operator, pair, ChangeOfMind.drawn(retarget, seed))
+    return demonstrate(env, operator, pair, ChangeOfMind.drawn(played.retarget_share, seed))
 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:

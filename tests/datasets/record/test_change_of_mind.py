@@ -33,7 +33,7 @@ def test_the_operator_obeys_the_second_command_and_succeeds(env_type):
     settings = settings_of(env_type)
     first_frames = set()
     for pair in settings.pairs()[::3]:
-        episode = play_demonstration(settings, pair, with_images=False, retarget=1.0)
+        episode = play_demonstration(settings, pair, with_images=False)
         (start, first), (changed, second) = commands(episode)
         assert (start, first) == (0, pair.target_id)
         assert second != first
@@ -51,7 +51,7 @@ def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below):
     settings = settings_of(env_type)
     column = settings.task_spec.task_state_names.index(name)
     for pair in settings.pairs()[1:4]:
-        episode = play_demonstration(settings, pair, with_images=False, retarget=1.0)
+        episode = play_demonstration(settings, pair, with_images=False)
         changed = int(episode.command_frame[-1])
         assert episode.task_state[: changed + 1, column].max() < below
 
@@ -60,12 +60,10 @@ def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as
     drawn = [ChangeOfMind.drawn(0.3, (7, scene, 0)) is not None for scene in range(1000)]
     assert 0.25 < np.mean(drawn) < 0.35
     assert ChangeOfMind.drawn(0.0, (7, 0, 0)) is None
-    settings = settings_of("toy_reach")
+    without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
     same = [
-        np.array_equal(
-            *(play_demonstration(settings, pair, with_images=False, retarget=share).action for share in (0.0, 0.5))
-        )
-        for pair in settings.pairs()
+        np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
+        for pair in without.pairs()
     ]
     assert 0 < sum(same) < len(same)
 
