@@ -156,11 +156,11 @@ class PictureClient:
 
     def close(self) -> None:
         """Disconnect."""
-        if self._socket is not None:
+        connection, self._socket, self._newest = self._socket, None, None  # the listener may do so too
+        if connection is not None:
             with contextlib.suppress(OSError):
-                self._socket.shutdown(socket.SHUT_RDWR)
-            self._socket.close()
-        self._socket, self._newest = None, None
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
 
     def newest(self, oldest_s: float) -> Picture:
         """Return the newest picture.

@@ -33,7 +33,7 @@ def hold(page, served, key, *, until_frames):
             (page.keyboard.down if is_held else page.keyboard.up)(key)
         return state["recording"]["frames"] >= until_frames
 
-    until(enough, limit_s=60.0)
+    until(enough, limit_s=180.0)
     page.keyboard.up(key)
 
 

@@ -7,11 +7,12 @@ import pytest
 from lerobot.robots import RobotConfig, make_robot_from_config
 
 import lerobot_excav.plugin  # noqa: F401 - registers every --robot.type
+from lerobot_excav.robots.config_simulated_robot import SimulatedRobotConfig
 
 ROBOTS = {
     name: config
     for name, config in RobotConfig.get_known_choices().items()
-    if config.__module__.startswith("lerobot_excav.")
+    if config.__module__.startswith("lerobot_excav.") and issubclass(config, SimulatedRobotConfig)
 }
 
 

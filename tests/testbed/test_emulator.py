@@ -206,14 +206,14 @@ def test_pictures_come_by_name_the_mask_without_loss_and_unknown_names_never():
     with emulated() as served:
         mask = PictureClient(served.emulator.picture_address, "target_mask")
         mask.connect(5.0)
-        _, picture = mask.next(5.0)
+        picture = mask.next(5.0).pixels
         assert picture.shape == (48, 64, 3)
         assert set(np.unique(picture)) == {0, 255}
         main = PictureClient(served.emulator.picture_address, "main")
         main.connect(5.0)
-        first, second = (main.next(5.0)[0] for _ in range(2))
+        first, second = (main.next(5.0).taken_us for _ in range(2))
         assert second > first
-        assert main.newest(5.0)[1].std() > 5.0
+        assert main.newest(5.0).pixels.std() > 5.0
         for client in (main, mask):
             client.close()
         with pytest.raises(DeviceError, match="no picture of 'rear' came"):

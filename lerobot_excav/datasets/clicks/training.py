@@ -32,7 +32,9 @@ def train(
     torch.manual_seed(seed)
     network = ClickNetwork().train()
     optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, LEARNING_RATE, total_steps=steps, pct_start=0.1)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, LEARNING_RATE, total_steps=steps, pct_start=max(0.1, 2 / steps)
+    )
     with tqdm(total=steps, disable=not show_progress, desc="training", unit="step") as bar:
         for _ in range(steps):
             windows, masks = batch(scenes, batch_size, rng)

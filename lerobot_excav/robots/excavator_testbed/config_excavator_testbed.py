@@ -1,7 +1,7 @@
 """Configuration of `--robot.type=excavator_testbed`."""
 
 import ipaddress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from lerobot.cameras import CameraConfig
@@ -23,8 +23,9 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
     """
 
     address: str = setting("Address and port of the machine's datagrams", default="127.0.0.1:47500")
-    cameras: dict[str, CameraConfig] = field(default_factory=dict)
-    """Cameras by the names that policies know: main, cab and target_mask."""
+    cameras: dict[str, CameraConfig] = setting(
+        "Cameras of LeRobot by the names that policies know: main, cab and target_mask", default_factory=dict
+    )
     dead_man: str = setting(
         "Who lets the machine move: gamepad, a button that a person holds, or always, for an emulator on this computer",
         default="always",

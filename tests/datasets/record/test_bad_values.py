@@ -36,6 +36,7 @@ def is_declared(value, cls, name):
     allowed = declared_settings(cls)[name]
     types = typing.get_type_hints(cls)[name]
     types = typing.get_args(types) or (types,)
+    types = (*types, int) if float in types else types
     if value is None or type(value) not in types:
         return value is None and type(None) in types
     if allowed.values is not None:

@@ -71,7 +71,8 @@ def test_without_the_column_or_without_changes_padding_is_as_lerobot_says(datase
 
 
 def test_a_dataset_that_is_elsewhere_is_warned_of(dataset, tmp_path, caplog):
-    meta, _ = described(dataset, root=tmp_path)
+    meta, _ = described(dataset)
+    meta.root = tmp_path
     is_pad = torch.zeros(2, 5, dtype=torch.bool)
     assert CommandChanges(meta).is_pad({"action_is_pad": is_pad}) is is_pad
     assert "nothing says where commands change" in caplog.text
