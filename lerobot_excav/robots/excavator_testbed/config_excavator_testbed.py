@@ -7,7 +7,7 @@ from pathlib import Path
 from lerobot.cameras import CameraConfig
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.errors import ConfigurationError, require
+from lerobot_excav.errors import ConfigurationError, require, shown
 from lerobot_excav.setting import check_settings, setting
 
 DEAD_MEN = ("always", "gamepad")
@@ -55,13 +55,17 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
     )
 
     def __post_init__(self) -> None:
+        require(
+            isinstance(self.cameras, dict),
+            f"robot.cameras={shown(self.cameras)} is not possible; give cameras by name, or leave it out",
+        )
         super().__post_init__()
         check_settings(self, "robot.")
         host, _ = self.host_and_port
         require(
             self.dead_man != "always" or is_loopback(host),
-            f"robot.dead_man='always' lets the machine at {host} move while nobody watches; it is for an emulator on "
-            "this computer (127.0.0.1). Give robot.dead_man=gamepad",
+            f"robot.address={self.address!r} with robot.dead_man='always' lets the machine at {host} move while nobody "
+            "watches; that is for an emulator on this computer (127.0.0.1). Give robot.dead_man=gamepad",
         )
 
     @property

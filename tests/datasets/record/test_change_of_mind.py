@@ -16,7 +16,7 @@ from lerobot_excav.datasets.record.simulation import make_environment, play_demo
 from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.errors import ConfigurationError
 
-SMALL = {"observation_height": 32, "observation_width": 48}
+SMALL = {"observation_height": 40, "observation_width": 56}  # of their own: workers keep the last environment open
 TASKS = {"toy_reach": SMALL, "fr5_grasp": SMALL, "excavator": {"fidelity": "fast", **SMALL}}
 
 
