@@ -56,7 +56,7 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
 
     def __post_init__(self) -> None:
         require(
-            isinstance(self.cameras, dict),
+            isinstance(self.cameras, dict) and all(isinstance(each, CameraConfig) for each in self.cameras.values()),
             f"robot.cameras={shown(self.cameras)} is not possible; give cameras by name, or leave it out",
         )
         super().__post_init__()
