@@ -26,13 +26,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.object_pixels import object_by_colour, object_by_depth
-from lerobot_excav.envs.masks.options import MaskOptions
+from lerobot_excav.envs.masks.options import ANY, MaskOptions, require_distinct
 from lerobot_excav.envs.masks.shot import Shot, reduced
 from lerobot_excav.envs.masks.source import MaskView, Pixels, TargetMask, register_mask_source
 from lerobot_excav.errors import ConfigurationError, require
-
-ANY = "*"
-"""Key of the entry for whatever has none of its own."""
 
 FINER = 8
 """How many times finer a polygon is drawn than the mask (kind: guess)."""
@@ -80,9 +77,7 @@ class ManualSource:
             "mask_source='manual' needs masks: give mask_options=FILE, a TOML file of tables [[mask]], each with a key "
             "and a polygon, a click or a box",
         )
-        keys = [entry.key for entry in options.mask]
-        twice = sorted({key for key in keys if keys.count(key) > 1})
-        require(not twice, f"mask_options: two masks have the key {', '.join(twice)}; leave one out")
+        require_distinct([entry.key for entry in options.mask], "masks")
         self._entries = {entry.key: entry for entry in options.mask}
 
     def mask(self, view: MaskView, command: Command) -> TargetMask | None:

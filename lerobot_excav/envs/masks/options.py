@@ -2,12 +2,16 @@
 
 import hashlib
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.errors import ConfigurationError, require
+
+ANY = "*"
+"""Key of the entry for whatever has none of its own, in options that list entries."""
 
 
 class MaskOptions(BaseModel):
@@ -31,6 +35,20 @@ def read_options[Options: MaskOptions](kind: type[Options], name: str, path: Pat
         raise ConfigurationError(
             f"mask_options={path}: {place or 'the file'}: {first['msg']}; the mask source {name!r} takes {allowed}"
         ) from error
+
+
+def require_distinct(keys: Sequence[str], entries: str) -> None:
+    """Check that no two entries of a file of options have the same key.
+
+    Args:
+        keys: Their keys.
+        entries: What they are called.
+
+    Raises:
+        ConfigurationError: Two have.
+    """
+    twice = sorted({key for key in keys if keys.count(key) > 1})
+    require(not twice, f"mask_options: two {entries} have the key {', '.join(twice)}; leave one out")
 
 
 def options_words(path: Path) -> str:

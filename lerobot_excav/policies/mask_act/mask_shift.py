@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from lerobot_excav.policies.mask_act.picture_shift import is_in
+from lerobot_excav.policies.mask_act.picture_shift import shifted
 
 
 def shift_alone(mask: Tensor, shift_px: int, crop: Sequence[int] | None = None) -> Tensor:
@@ -23,14 +23,8 @@ def shift_alone(mask: Tensor, shift_px: int, crop: Sequence[int] | None = None) 
     Returns:
         Moved masks, a new tensor.
     """
-    size, _, height, width = mask.shape
-    down, right = torch.randint(-shift_px, shift_px + 1, (2, size, 1)).to(mask.device)
-    rows = torch.arange(height, device=mask.device) - down  # (B, H): where each row comes from
-    columns = torch.arange(width, device=mask.device) - right
-    sample = torch.arange(size, device=mask.device)[:, None, None]
-    source = (rows.clamp(0, height - 1)[:, :, None], columns.clamp(0, width - 1)[:, None, :])
-    was_inside = is_in(rows, height)[:, :, None] & is_in(columns, width)[:, None, :]
-    moved = (mask[sample, 0, *source] * was_inside)[:, None]
+    shifted_mask, was_inside = shifted(mask, shift_px)
+    moved, (height, width) = shifted_mask * was_inside, mask.shape[-2:]
     top, left, used_height, used_width = crop or (0, 0, height, width)
     used = moved[:, :, top : top + used_height, left : left + used_width]
     is_left = used.flatten(1).any(dim=1)[:, None, None, None]

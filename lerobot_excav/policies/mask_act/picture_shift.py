@@ -18,16 +18,24 @@ def shift_together(picture: Tensor, mask: Tensor, shift_px: int) -> tuple[Tensor
     Returns:
         Moved picture and mask, new tensors.
     """
-    size, _, height, width = picture.shape
-    down, right = torch.randint(-shift_px, shift_px + 1, (2, size, 1)).to(picture.device)
-    rows = torch.arange(height, device=picture.device) - down  # (B, H): where each row comes from
-    columns = torch.arange(width, device=picture.device) - right
-    both = torch.cat([picture, mask], dim=1)
-    sample = torch.arange(size, device=picture.device)[:, None, None]
-    source = (rows.clamp(0, height - 1)[:, :, None], columns.clamp(0, width - 1)[:, None, :])
-    moved = both[sample, :, *source].permute(0, 3, 1, 2)
-    was_inside = is_in(rows, height)[:, None, :, None] & is_in(columns, width)[:, None, None, :]
+    moved, was_inside = shifted(torch.cat([picture, mask], dim=1), shift_px)
     return moved[:, :-1], moved[:, -1:] * was_inside
+
+
+def shifted(pixels: Tensor, shift_px: int) -> tuple[Tensor, Tensor]:
+    """Move every stack of channels (B, C, H, W) by a whole number of pixels, drawn for each sample and axis.
+
+    Returns:
+        The moved stacks, whose edges are repeated, and which of their pixels come from inside, bool (B, 1, H, W).
+    """
+    size, _, height, width = pixels.shape
+    down, right = torch.randint(-shift_px, shift_px + 1, (2, size, 1)).to(pixels.device)
+    rows = torch.arange(height, device=pixels.device) - down  # (B, H): where each row comes from
+    columns = torch.arange(width, device=pixels.device) - right
+    sample = torch.arange(size, device=pixels.device)[:, None, None]
+    source = (rows.clamp(0, height - 1)[:, :, None], columns.clamp(0, width - 1)[:, None, :])
+    moved = pixels[sample, :, *source].permute(0, 3, 1, 2)
+    return moved, is_in(rows, height)[:, None, :, None] & is_in(columns, width)[:, None, None, :]
 
 
 def is_in(number: Tensor, count: int) -> Tensor:

@@ -23,16 +23,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.options import MaskOptions
+from lerobot_excav.envs.masks.options import ANY, MaskOptions, require_distinct
 from lerobot_excav.envs.masks.shot import Shot, reduced
 from lerobot_excav.envs.masks.source import MaskView, TargetMask, register_mask_source
 from lerobot_excav.errors import ConfigurationError, require
 
 if TYPE_CHECKING:
     from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
-
-ANY = "*"
-"""Key of the entry for whatever has none of its own."""
 
 _STREAM = 0x51C3  # names the random streams of missed clicks
 
@@ -74,9 +71,7 @@ class ClickSource:
 
     def __init__(self, options: ClickOptions) -> None:
         self._options = options
-        keys = [click.key for click in options.click]
-        twice = sorted({key for key in keys if keys.count(key) > 1})
-        require(not twice, f"mask_options: two clicks have the key {', '.join(twice)}; leave one out")
+        require_distinct([click.key for click in options.click], "clicks")
         self._clicks = {click.key: click.place for click in options.click}
         self._segmenter: ClickSegmenter | None = None
 
