@@ -44,7 +44,8 @@ $(READY): pyproject.toml uv.lock
 	  echo "  Ubuntu 24.04: sudo apt-get install python3.12-venv; then run make again."; exit 1; }
 	@echo "Installing into $(VENV): LeRobot, PyTorch and MuJoCo, several GB the first time. Each package is named as it loads."
 	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
-	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --inexact
+	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --inexact --compile-bytecode
+	@$(RUN)/python -m compileall -q lerobot_excav lerobot_env_excav
 	@$(RUN)/lerobot-excav warmup
 	@touch $@
 

@@ -3,10 +3,11 @@
 # Usage: examples/tutorial.sh OUTPUT_FOLDER      Steps that are finished are not run again; delete the folder to start over.
 set -euo pipefail
 OUT=${1:?usage: tutorial.sh OUTPUT_FOLDER}
-SCENES=${TUTORIAL_SCENES:-15}     # piles of the set train
-STAGES=${TUTORIAL_STAGES:-0,4}    # each as it is drawn, and after four dug cycles; x 4 targets = paired demonstrations
-STEPS=${TUTORIAL_STEPS:-3000}     # training steps
+SCENES=${TUTORIAL_SCENES:-30}     # piles of the set train
+STAGES=${TUTORIAL_STAGES:-0,1-13} # each as it is drawn, and after 1 to 13 dug cycles; x 4 targets = paired demonstrations
+STEPS=${TUTORIAL_STEPS:-7500}     # training steps
 EPISODES=${TUTORIAL_EPISODES:-10} # evaluation episodes, on test scenes
+export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} # the network is small: more threads wait for each other
 source "$(dirname "$0")/own_folder.sh"
 
 say "1/4  Recording up to 4 paired demonstrations of $SCENES piles at stages $STAGES -> $OUT/dataset"
@@ -24,7 +25,7 @@ say "3/4  Training mask_act for $STEPS steps -> $OUT/train"
     --policy.chunk_size=10 --policy.n_action_steps=5 --policy.actions_per_token=1 --policy.device=cpu \
     --policy.push_to_hub=false \
     --dataset.repo_id=local/tutorial --dataset.root="$OUT/dataset" --output_dir="$OUT/train" \
-    --steps="$STEPS" --batch_size=16 --num_workers=1 --log_freq=50 --save_freq="$STEPS" --env_eval_freq=0 --wandb.enable=false
+    --steps="$STEPS" --batch_size=16 --num_workers=1 --log_freq=50 --save_freq=1500 --env_eval_freq=0 --wandb.enable=false
 }
 
 say "4/4  Evaluating on $EPISODES test scenes -> $OUT/eval"

@@ -22,18 +22,10 @@ TRAIN = (
 
 
 def hold(page, served, key, *, until_frames):
-    """Hold a key as a person does: once the sticks count, and again when a busy machine has lost them meanwhile."""
-    is_held = False
-
-    def enough():
-        nonlocal is_held
-        state = state_of(served)
-        if state["ready"] != is_held:
-            is_held = state["ready"]
-            (page.keyboard.down if is_held else page.keyboard.up)(key)
-        return state["recording"]["frames"] >= until_frames
-
-    until(enough, limit_s=180.0)
+    """Hold a key until so many frames are recorded; it counts from the moment on when the sticks do."""
+    until(lambda: state_of(served)["ready"])
+    page.keyboard.down(key)
+    until(lambda: state_of(served)["recording"]["frames"] >= until_frames, limit_s=180.0)
     page.keyboard.up(key)
 
 
@@ -47,7 +39,7 @@ def record_episode(page, served):
     expect(page.locator("#judged")).to_be_hidden()
 
 
-def test_eight_paired_episodes_are_recorded_pass_qc_and_are_trained_on(open_page, tmp_path):
+def test_eight_paired_episodes_are_recorded_pass_qc_and_are_trained_on(open_page, patience, tmp_path):
     out = tmp_path / "by_hand"
     with serving(out=out, scenes=2) as served:
         page = open_page(served)

@@ -18,6 +18,9 @@ from lerobot_excav.setting import declared_settings
 TASKS: dict[str, TaskSpec] = {}
 """Tasks by their id."""
 
+MANY_WORLDS_ENTRY = "lerobot_excav.envs.tasks.many_worlds:ManyWorlds"
+"""What `gymnasium.make_vec` makes of any task; loaded at first use."""
+
 SHARED_BY_A_ROBOT = (
     *("env_type", "cameras", "views", "state_names", "action_names", "action_low", "action_high", "task_state_names"),
     *("settings", "simulation_version", "changes", "target_count"),
@@ -35,7 +38,9 @@ def register_task(spec: TaskSpec) -> None:
     known = TASKS.setdefault(spec.id, spec)
     require(known is spec, f"the task {spec.id!r} exists; give the new one another id")
     # No time limit of Gymnasium's: the environment owns its length, and hands out its metrics when that is over.
-    gym.register(id=spec.gym_id, entry_point=spec.env_entry, kwargs={"task": spec.id})
+    gym.register(
+        id=spec.gym_id, entry_point=spec.env_entry, vector_entry_point=MANY_WORLDS_ENTRY, kwargs={"task": spec.id}
+    )
 
 
 def _require_fitting_robot(spec: TaskSpec) -> None:

@@ -1,0 +1,125 @@
+"""Many worlds in one process: each is the world that it would be alone, and they step at the same time."""
+
+import threading
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import lerobot_excav  # noqa: F401 - registers the tasks
+from lerobot_excav.envs.tasks.many_worlds import ManyWorlds
+from lerobot_excav.envs.tasks.registry import TASKS
+from lerobot_excav.errors import ConfigurationError
+
+WORLDS, FRAMES, LENGTH = 3, 9, 4
+OWN = [spec for spec in TASKS.values() if spec.env_entry.startswith("lerobot_excav.")]
+FAST = {"fidelity": "fast"}
+
+
+def settings_of(spec, **others):
+    return {"episode_length": LENGTH, **(FAST if spec.env_type == "excavator" else {}), **others}
+
+
+def actions_of(env):
+    rng = np.random.default_rng(7)
+    return [rng.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32) for _ in range(FRAMES)]
+
+
+def assert_same(mine, other):
+    """Compare bit by bit what may hold dictionaries and arrays of objects, and NaN for what has not been measured."""
+    if isinstance(mine, dict):
+        assert list(mine) == list(other)
+        mine, other = list(mine.values()), list(other.values())
+    if isinstance(mine, list | tuple) or (isinstance(mine, np.ndarray) and mine.dtype.hasobject):
+        for inner, others_inner in zip(mine, other, strict=True):
+            assert_same(inner, others_inner)
+    else:
+        np.testing.assert_array_equal(mine, other, strict=True)
+
+
+def played(vector, seed=3):
+    """Play past the end of an episode; return all that came back."""
+    steps = [vector.reset(seed=seed)]
+    steps += [vector.step(action) for action in actions_of(vector)]
+    vector.close()
+    return steps
+
+
+@pytest.mark.parametrize("autoreset_mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("obs_type", ["agent_pos", "pixels_agent_pos"])
+@pytest.mark.parametrize("spec", OWN, ids=lambda spec: spec.id)
+def test_each_world_is_bit_by_bit_the_one_that_it_would_be_alone(spec, obs_type, autoreset_mode):
+    settings = settings_of(spec, obs_type=obs_type)
+    ours = gym.make_vec(spec.gym_id, WORLDS, autoreset_mode=autoreset_mode, threads=2, **settings)
+    theirs = gym.make_vec(
+        spec.gym_id, WORLDS, vectorization_mode="sync", vector_kwargs={"autoreset_mode": autoreset_mode}, **settings
+    )
+    assert_same(played(ours), played(theirs))
+
+
+def make(task="Scoop-v0", **settings):
+    return ManyWorlds(WORLDS, task=task, obs_type="agent_pos", episode_length=LENGTH, **settings)
+
+
+def test_worlds_step_at_the_same_time():
+    vector = make(threads=WORLDS, **FAST)
+    vector.reset(seed=0)
+    together = threading.Barrier(WORLDS, timeout=60.0)
+    for env in vector.envs:
+        step = env.env.step
+        env.env.step = lambda action, step=step: (together.wait(), step(action))[1]
+    vector.step(np.zeros(vector.action_space.shape, np.float32))
+    vector.close()
+
+
+def test_no_more_worlds_step_at_the_same_time_than_there_are_threads():
+    vector = make(threads=1, **FAST)
+    vector.reset(seed=0)
+    names = set()
+    for env in vector.envs:
+        step = env.env.step
+        env.env.step = lambda action, step=step: (names.add(threading.current_thread().name), step(action))[1]
+    vector.step(np.zeros(vector.action_space.shape, np.float32))
+    vector.close()
+    assert len(names) == 1
+
+
+def test_seeds_may_be_one_for_each_world_and_some_worlds_may_be_reset_alone():
+    vector = make("FR5Grasp-v0")
+    vector.reset(seed=[5, 9, 2])
+    assert [env.get_wrapper_attr("scene_id") for env in vector.envs] == [5, 9, 2]
+    kept = vector.step(np.zeros(vector.action_space.shape, np.float32))[0]["agent_pos"][[0, 2]]
+    observation, _ = vector.reset(seed=7, options={"reset_mask": np.array([False, True, False])})
+    assert [env.get_wrapper_attr("scene_id") for env in vector.envs] == [5, 8, 2]
+    assert np.array_equal(observation["agent_pos"][[0, 2]], kept)
+    vector.close()
+
+
+def test_options_reach_every_world():
+    vector = make("FR5Grasp-v0")
+    vector.reset(options={"scene_id": 4, "target_id": 2})
+    assert [env.get_wrapper_attr("target_id") for env in vector.envs] == [2] * WORLDS
+    vector.close()
+
+
+def test_a_world_that_fails_leaves_nothing_of_the_others_for_the_next_step():
+    vector = make("FR5Grasp-v0")
+    vector.reset(seed=0)
+    good, bad = np.zeros(vector.action_space.shape, np.float32), np.zeros(vector.action_space.shape, np.float32)
+    bad[0] = np.nan
+    with pytest.raises(ConfigurationError, match="action"):
+        vector.step(bad)
+    assert all(env.begun is None for env in vector.envs)
+    frames = [env.unwrapped._frame for env in vector.envs]
+    vector.step(good)
+    assert [env.unwrapped._frame for env in vector.envs] == [frame + 1 for frame in frames]
+    vector.close()
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [({"num_envs": 0}, "num_envs=0"), ({"threads": 0}, "threads=0"), ({"autoreset_mode": "later"}, "autoreset_mode")],
+)
+def test_what_is_not_possible_is_named(settings, named):
+    with pytest.raises(ConfigurationError, match=named):
+        ManyWorlds(**{"num_envs": 2, "task": "Scoop-v0", **settings})
