@@ -25,7 +25,7 @@ export HF_HUB_OFFLINE ?= 1
 export TOKENIZERS_PARALLELISM := false
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console tutorial demo-fr5 table-manipulation table-excavator test test-lowest test-long fuzz validate judge-data lint type docs wheel clean
+.PHONY: help setup demo console tutorial demo-fr5 table-manipulation table-excavator test test-all test-cluster test-lowest test-long fuzz validate judge-data lint type docs wheel clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -67,13 +67,22 @@ table-manipulation: $(READY) ## the FR5 grasping table: data, trainings, evaluat
 table-excavator: $(READY) ## the excavator's table: data, trainings, evaluations, audit, report (more than a day; JOBS=2; run again to continue)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" snakemake -s workflows/excavator/Snakefile --cores $(JOBS)
 
-test: $(READY) ## run the test suite
+test: $(READY) ## run the test suite, but for what is marked slow (ten minutes)
+	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python $(PYTEST) -m "not slow"
+
+test-all: $(READY) ## run the whole suite (half an hour)
 	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python $(PYTEST)
+
+test-cluster: $(READY) ## start a SLURM of two nodes here, kill one at work, compare results (15 minutes; needs slurm-wlm, munge)
+	@command -v slurmd >/dev/null && command -v munged >/dev/null || { \
+	  echo "make: slurmd or munged is not here; Debian, Ubuntu: sudo apt-get install --no-install-recommends slurm-wlm munge"; exit 1; }
+	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python -m pytest tests/cluster/test_*.py
 
 test-lowest: $(LOWEST)/.ready ## test the simulators with the lowest versions that pyproject.toml allows (LOWEST_TESTS=tests for all)
 	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) $(LOWEST_TESTS)
 
 test-long: $(LOWEST)/.ready $(NEWEST)/.ready ## everything before an issue is called done: both ends of all versions, kills, fuzz (hours)
+	@OMP_NUM_THREADS=1 $(RUN)/python $(PYTEST) tests
 	@OMP_NUM_THREADS=1 $(LOWEST)/bin/python $(PYTEST) tests
 	@OMP_NUM_THREADS=1 $(NEWEST)/bin/python $(PYTEST) tests
 	@OMP_NUM_THREADS=1 $(RUN)/python -m pytest tests/long/test_*.py

@@ -141,6 +141,7 @@ def test_image_transforms_are_shown(run, dataset, tmp_path, monkeypatch):
     assert len(list(tmp_path.rglob("*.png"))) > 10
 
 
+@pytest.mark.slow
 def test_a_dataset_is_visualised(dataset, tmp_path):
     pytest.importorskip("rerun", reason="the extra viz")
     flags = ["--repo-id=local/data", f"--root={dataset}", "--episode-index=0", "--save=1", f"--output-dir={tmp_path}"]

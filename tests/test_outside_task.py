@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+pytestmark = pytest.mark.slow
+
 TOY = Path(__file__).parents[1] / "examples" / "toy_reach"
 METADATA = "Metadata-Version: 2.1\nName: lerobot_env_toy_reach\nVersion: 0.1.0\n"
 ENTRY_POINTS = "[lerobot_excav.plugins]\ntoy_reach = toy_reach\n"

@@ -16,8 +16,6 @@ from validation.page_operator.pad import planned
 from ..console.conftest import Planted
 from .conftest import serving
 
-pytestmark = pytest.mark.slow
-
 
 def until(condition, limit_s=20.0):
     deadline = time.monotonic() + limit_s

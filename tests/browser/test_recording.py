@@ -4,15 +4,12 @@ import subprocess
 import sys
 
 import pandas as pd
-import pytest
 from playwright.sync_api import expect
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
 
 from .conftest import serving
 from .test_page import state_of, until
-
-pytestmark = pytest.mark.slow
 
 TRAIN = (
     *("--policy.type=mask_act", "--policy.preset=fast", "--policy.n_encoder_layers=1", "--policy.chunk_size=2"),

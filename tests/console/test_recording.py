@@ -15,6 +15,8 @@ from lerobot_excav.errors import ConfigurationError, DatasetError
 
 from .conftest import CENTRE, Planted, axes_of
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 CURL = [0.0, 0.0, -0.5, 0.0]
 SHORT = 6

@@ -15,6 +15,8 @@ from lerobot_excav.page.feed import Feed
 
 from .conftest import Driver
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):

@@ -253,7 +253,10 @@ def test_an_impossible_target_is_refused(env):
         env.reset(options={"scene_id": 0, "target_id": 99})
 
 
-@pytest.mark.parametrize("use_async", [False, True], ids=["one process", "own processes"])
+@pytest.mark.parametrize(
+    "use_async",
+    [pytest.param(False, id="one process"), pytest.param(True, id="own processes", marks=pytest.mark.slow)],
+)
 def test_lerobots_environments_give_the_same_bits_as_one_alone(gym_id, trace, *, use_async):
     # One frame more than is played: at the end of an episode LeRobot's wrapper repeats the last transition.
     spec = TASKS[gym_id.split("/")[1]]

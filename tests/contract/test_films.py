@@ -7,6 +7,8 @@ import pytest
 from lerobot_excav.envs.tasks.registry import TASKS
 from lerobot_excav.errors import ConfigurationError
 
+pytestmark = pytest.mark.slow
+
 LENGTH = 7
 SMALL = {"film_height": 64, "film_width": 96, "episode_length": LENGTH}
 

@@ -10,6 +10,8 @@ from lerobot_excav.envs.tasks.caption import bar_height_px
 from lerobot_excav.envs.tasks.registry import TASKS
 from lerobot_excav.errors import ConfigurationError
 
+pytestmark = pytest.mark.slow
+
 SPECS = sorted((s for s in TASKS.values() if s.env_entry.startswith("lerobot_excav.")), key=lambda spec: spec.id)
 SMALL = {"render_height": 96, "render_width": 128}
 

@@ -50,12 +50,14 @@ def the_operator(soil, folder):
     return soil
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [the_environment, the_robot, the_demonstrations, the_operator])
 def test_every_command_digs_the_soil_it_is_given(start, tmp_path):
     seen = {soil: start(soil, tmp_path) for soil in PRESETS}
     assert len(set(seen.values())) == len(PRESETS)
 
 
+@pytest.mark.slow
 def test_soils_fill_the_bucket_differently():
     taken_kg = set()
     for soil in PRESETS:

@@ -21,6 +21,7 @@ def test_every_task_of_this_package_offers_it():
 
 
 # Positions and velocities have no bound that a box could state; an arm is commanded in radians.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*Box observation space m.* value is .*infinity:UserWarning")
 @pytest.mark.filterwarnings("ignore:.*For Box action spaces, we recommend:UserWarning")
 @pytest.mark.filterwarnings("error::UserWarning")

@@ -9,6 +9,8 @@ from lerobot_excav.datasets.pairs.paired_index import write_index
 
 from .toy import load, record_toy
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("storage", ["image", "video"])
 def test_shards_put_together_are_the_dataset_of_one_piece(tmp_path, storage):

@@ -16,6 +16,8 @@ from ..datasets.damage import HARMFUL, HARMLESS, VIDEOS
 from ..datasets.toy import MAIN, MASK, STATE, record_small
 from .mutation import digests, harmful, harmless, inputs, require_kept, require_right, run
 
+pytestmark = pytest.mark.slow
+
 CAMERAS = (MAIN, MASK, "observation.images.near")
 NUMBERS = ("index", "frame_index", "episode_index", "task_index", "excav.scene_id", "excav.stage")
 VECTORS = (STATE, "action", "excav.task_state", "excav.outcome")

@@ -12,6 +12,8 @@ from lerobot_excav.evaluation.result_page import page_files
 from ..evaluation.conftest import GRASP, line
 from .mutation import GARBAGE, digests, harmful, harmless, inputs, overwritten, require_kept, require_right, run
 
+pytestmark = pytest.mark.slow
+
 ROWS = {
     "title": "Does it obey?",
     "metrics": "METRICS",

@@ -12,6 +12,8 @@ from ..datasets.complete.test_resimulation import make_recording
 from ..datasets.toy import record_toy
 from .mutation import GARBAGE, digests, harmful, harmless, inputs, overwritten, require_kept, require_right, run
 
+pytestmark = pytest.mark.slow
+
 LOG = "session.jsonl"
 # What cannot stand in a line, by what the session log says of its events.
 WRONG_FIELDS = {

@@ -18,6 +18,8 @@ from lerobot_excav.envs.machines.excavator.machine import ExcavatorMachine
 from lerobot_excav.envs.soil import FIDELITIES, PRESETS, Reaction, Soil
 from lerobot_excav.envs.soil.bucket import heaped_volume_m3
 
+pytestmark = pytest.mark.slow
+
 LEDGER_TOLERANCE_KG = 1e-6
 FARTHEST_M = 20.0
 """Nothing is farther from the origin: the machine reaches 9 m, and soil falls down (guess)."""

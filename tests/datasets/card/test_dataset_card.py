@@ -24,6 +24,8 @@ from lerobot_excav.scripts.main import main
 from ..toy import load
 from .hub import hub
 
+pytestmark = pytest.mark.slow
+
 TOY = Path(__file__).parents[3] / "examples" / "toy_reach"
 
 

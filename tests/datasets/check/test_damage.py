@@ -21,6 +21,7 @@ def copy(small_datasets, tmp_path):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("storage", "name"), [(storage, name) for storage, damages in ALL_HARMFUL.items() for name in damages]
 )

@@ -116,6 +116,7 @@ def test_a_replay_by_another_simulation_is_found(paired_dataset, tmp_path, monke
     assert found[4].startswith("replay leaves the recorded state at frame 1")
 
 
+@pytest.mark.slow
 def test_sound_episodes_of_other_masks_and_tables_pass_also_together(tmp_path):
     others = {
         "oracle": {"table": "ice"},

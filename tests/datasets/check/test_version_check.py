@@ -14,6 +14,8 @@ from lerobot_excav.scripts.main import main
 
 from ..toy import load, record_toy
 
+pytestmark = pytest.mark.slow
+
 LATER = replace(REACH, simulation_version=2, changes={1: "the first", 2: "a rounder disc"})
 
 

@@ -21,6 +21,8 @@ from lerobot_excav.errors import DatasetError
 
 from ..toy import load, write_session
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def recordings(changing_datasets, tmp_path_factory):

@@ -20,6 +20,8 @@ from lerobot_excav.scripts.main import main
 
 from ..toy import load, record_toy, write_session
 
+pytestmark = pytest.mark.slow
+
 
 def make_recording(dataset, folder, env=None):
     """Make what `lerobot-record` leaves of a session: no excav columns, but a log that the robot wrote."""

@@ -120,6 +120,7 @@ def test_a_mask_that_is_wrong_is_found(storage, tmp_path, monkeypatch, spoil, pr
     assert check_dataset(tmp_path / "d", replays=0).episodes["qc_problem"].tolist() == [problem]
 
 
+@pytest.mark.slow
 def test_videos_and_commands_survive_lerobots_tools(changing_datasets, tmp_path):
     original = changing_datasets["video"]
     assert len(list(original.glob(f"videos/{MAIN}/*/*.mp4"))) == 8  # each episode has its own

@@ -70,6 +70,7 @@ def test_verdicts_follow_their_episode_when_episodes_are_deleted(paired_dataset,
     assert failed[["episode_index", "qc_problem"]].to_numpy().tolist() == [[3, "odd"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fixture", ["paired_dataset", "changing_datasets"])
 def test_the_index_survives_splitting_and_merging(request, fixture, tmp_path):
     dataset = request.getfixturevalue(fixture)

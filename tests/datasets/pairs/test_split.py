@@ -56,6 +56,7 @@ def lerobot_split(root: Path, flags: list[str]) -> tuple[list[int], list[int]]:
     return train.episodes, evaluation.episodes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["scene", "episode"])
 @pytest.mark.parametrize("fraction", [0.2, 0.37])
 def test_stock_lerobot_train_splits_as_the_flags_say(paired_dataset, unit, fraction):

@@ -65,6 +65,7 @@ def test_a_setting_of_a_task_is_declared_or_refused_by_its_name(task_id, name, v
         json.dumps(env.settings.as_dict())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("env_type", "name"), PLAYED_FIELDS)
 @given(value=bad_values)
 def test_a_setting_of_demonstrations_is_declared_or_refused_by_its_name(env_type, name, value):

@@ -12,6 +12,8 @@ from lerobot_excav.datasets.record.provenance import read_provenance
 from lerobot_excav.datasets.record.simulation import play_again
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = {"fidelity": "fast", "observation_height": 32, "observation_width": 32}
 
 

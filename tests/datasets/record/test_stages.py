@@ -79,6 +79,7 @@ def test_targets_that_a_start_does_not_offer_are_skipped_and_said(tmp_path, monk
         record_toy(tmp_path / "e", scenes=1, stages="9")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", [{}, NEAREST], ids=["all", "nearest"])
 def test_an_interrupted_run_reaches_nothing_twice_and_continues_to_the_same_bytes(tmp_path, monkeypatch, played, rule):
     settings = {"scenes": 2, "stages": "0,2,4", **rule}

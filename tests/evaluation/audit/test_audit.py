@@ -17,6 +17,8 @@ from lerobot_excav.scripts.main import main
 
 from .planted import SLOPES, Planted
 
+pytestmark = pytest.mark.slow
+
 SMALL = {"observation_height": 32, "observation_width": 48}
 
 

@@ -24,6 +24,7 @@ def drive(env, *, scene_id, target_id, seed):
     return np.array(actions), phases, info["episode_metrics"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene_id", range(3))
 @pytest.mark.parametrize("target_id", range(4))
 def test_operator_digs_every_target_of_a_scene(env, scene_id, target_id):
