@@ -90,7 +90,7 @@ test-long: $(LOWEST)/.ready $(NEWEST)/.ready ## everything before an issue is ca
 
 $(LOWEST)/.ready: pyproject.toml $(READY)
 	@$(UV) venv --quiet --clear --python $(RUN)/python $(LOWEST)
-	@$(UV) pip install --quiet --python $(LOWEST)/bin/python --resolution=lowest-direct --editable .
+	@$(UV) pip install --quiet --python $(LOWEST)/bin/python --resolution=lowest-direct --editable '.[gpu]'
 	@$(UV) pip install --quiet --python $(LOWEST)/bin/python $(TOOLS)
 	@touch $@
 
@@ -98,7 +98,7 @@ $(NEWEST)/.ready: pyproject.toml $(READY)
 	@command -v $(PYTHON_NEWEST) >/dev/null || { \
 	  echo "make: Python 3.13 is not here; install it, or name it: make PYTHON_NEWEST=/path/to/python3.13 test-long"; exit 1; }
 	@$(UV) venv --quiet --clear --python $(PYTHON_NEWEST) $(NEWEST)
-	@$(UV) pip install --quiet --python $(NEWEST)/bin/python --editable . $(TOOLS)
+	@$(UV) pip install --quiet --python $(NEWEST)/bin/python --editable '.[gpu]' $(TOOLS)
 	@touch $@
 
 fuzz: $(READY) ## random commands to machine and soil, and random changes of every file and setting (hours)

@@ -19,13 +19,14 @@ lerobot-excav qc "$OUT/dataset"
 lerobot-excav index "$OUT/dataset"
 
 say "3/4  Training mask_act for $STEPS steps -> $OUT/train"
-[ -d "$OUT/train/checkpoints/last" ] || {
+[ -f "$OUT/train.done" ] || {
   rm -rf "$OUT/train"
   lerobot-train --policy.type=mask_act --policy.preset=fast --policy.n_encoder_layers=1 --policy.target_token=true \
     --policy.chunk_size=10 --policy.n_action_steps=5 --policy.actions_per_token=1 --policy.device=cpu \
     --policy.push_to_hub=false \
     --dataset.repo_id=local/tutorial --dataset.root="$OUT/dataset" --output_dir="$OUT/train" \
     --steps="$STEPS" --batch_size=16 --num_workers=1 --log_freq=50 --save_freq=1500 --env_eval_freq=0 --wandb.enable=false
+  touch "$OUT/train.done"
 }
 
 say "4/4  Evaluating on $EPISODES test scenes -> $OUT/eval"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
-from lerobot_excav.envs.masks.source import make_mask_source
+from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
@@ -57,7 +57,8 @@ class EmulatedSite:
             noise_px=settings.mask_noise_px,
         )
         self._masked: Command | None = None
-        self._mask: NDArray[np.uint8] = np.zeros((*settings.observation_size, 3), np.uint8)
+        self._mask: TargetMask | None = None
+        self._black: NDArray[np.uint8] = np.zeros((*settings.observation_size, 3), np.uint8)
         self._start, self._tell = first_scene * self._spec.starts_per_scene, on_over
         self._show()
         self.emulator = Emulator(
@@ -74,15 +75,20 @@ class EmulatedSite:
         """Return what the cameras show now, by name; the mask is made once for a command, black if nothing is found."""
         shown = {name: self._env.renderer.render(name) for name in self._spec.cameras if name not in ("main", MASK)}
         self._look()
-        return {"main": self._env.picture(), **shown, MASK: self._mask}
+        return {"main": self._env.picture(), **shown, MASK: self._mask_img()}
 
     def _look(self) -> None:
         """Make the mask of a new command."""
         if self._env.command is self._masked:
             return
         self._masked = self._env.command
-        mask = self._source.mask(self._env, self._masked)
-        self._mask = np.zeros_like(self._mask) if mask is None else mask.img
+        self._mask = self._source.mask(self._env, self._masked)
+
+    def _mask_img(self) -> NDArray[np.uint8]:
+        """Return the mask as it is shown now, black if nothing was found."""
+        if self._mask is None:
+            return self._black
+        return self._source.at_frame(self._mask, self._env, self._env.command, self._env.frame).img
 
     def close(self) -> None:
         """Switch the machine off, and free the graphics context."""

@@ -1,6 +1,7 @@
 """A SLURM of two nodes on this machine alone, in a folder of its own, with a key of its own."""
 
 import os
+import re
 import secrets
 import signal
 import socket
@@ -104,15 +105,35 @@ class Slurm:
         """Return the jobs that run on a node."""
         return self.say("squeue", "-h", "-w", node, "-t", "RUNNING", "-o", "%i").split()
 
+    def restarts_of(self, job: str) -> int:
+        """Return how often a job was put back and begun again."""
+        return int(re.findall(r"Restarts=(\d+)", self.say("scontrol", "show", "job", job))[0])
+
+    def commands_on(self, node: str) -> list[str]:
+        """Return the command lines of what runs on a node."""
+        return [_command(pid) for pid in self._started_for(node)]
+
     def pull_the_plug(self, node: str) -> None:
         """Kill a node at once, with everything that runs on it."""
         daemon = self._processes.pop(node)
-        children = _descendants(daemon.pid) | _started_for(node)
-        os.kill(daemon.pid, signal.SIGKILL)
-        for child in children:
+        own = self._started_for(node)
+        parents = _parents()
+        steps = {parents[pid] for pid in own if pid in parents and _name(parents[pid]) == "slurmstepd"}
+        daemon.kill()
+        for pid in own | steps:
             with suppress(ProcessLookupError):
-                os.kill(child, signal.SIGKILL)
+                os.kill(pid, signal.SIGKILL)
         daemon.wait()
+
+    def _started_for(self, node: str) -> set[int]:
+        """Return the processes of a node's jobs: their environment names this cluster and the node."""
+        marks = {f"SLURMD_NODENAME={node}".encode(), f"SLURM_CONF={self.folder}/slurm.conf".encode()}
+        own = set()
+        for environ in Path("/proc").glob("[0-9]*/environ"):
+            with suppress(OSError):  # it ended meanwhile, or is somebody else's
+                if marks <= set(environ.read_bytes().split(b"\0")):
+                    own.add(int(environ.parent.name))
+        return own
 
     def stop(self) -> None:
         """End everything that was started, and what is left of it."""
@@ -136,29 +157,13 @@ def _parents() -> dict[int, int]:
     return parents
 
 
-def _descendants(*roots: int) -> set[int]:
-    parents, found = _parents(), set(roots)
-    while more := {pid for pid, parent in parents.items() if parent in found} - found:
-        found |= more
-    return found - set(roots)
-
-
-def _started_for(node: str) -> set[int]:
-    """Return the processes of a node's jobs: their environment says where they run; SLURM's own steps adopt them."""
-    own, mark = set(), f"SLURMD_NODENAME={node}".encode()
-    for environ in Path("/proc").glob("[0-9]*/environ"):
-        try:
-            variables = environ.read_bytes().split(b"\0")
-        except OSError:
-            continue  # it ended meanwhile, or is somebody else's
-        if mark in variables:
-            own.add(int(environ.parent.name))
-    steps = {parent for pid, parent in _parents().items() if pid in own}
-    return own | {pid for pid in steps if _name(pid) == "slurmstepd"}
-
-
 def _name(pid: int) -> str:
-    try:
+    with suppress(OSError):
         return Path(f"/proc/{pid}/comm").read_text().strip()
-    except OSError:
-        return ""
+    return ""
+
+
+def _command(pid: int) -> str:
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+    return ""

@@ -15,12 +15,12 @@ MASK_CONDITIONS = ("correct", "zero", "random", "mismatched")
 """`correct`; `zero`: an empty mask; `random`: the same blob elsewhere in the picture, off its place; `mismatched`: the
 mask of another target, or as `random` where no other can be commanded."""
 
-MASK_NOISES = ("none", "shift", "erode", "dilate")
+MASK_NOISES = ("none", "shift", "erode", "dilate", "flicker")
 """`none`; `shift`: moved in a random direction, kept inside the picture; `erode`: without the pixels near its outside
-(city-block distance); `dilate`: with those near it."""
+(city-block distance); `dilate`: with those near it; `flicker`: as `shift`, in another direction at every frame."""
 
 _SHIFT_TRIES = 1000
-_STREAM = 0x3A5C  # names this family of random streams
+_STREAM, _FLICKER_STREAM = 0x3A5C, 0x3A5D  # name these families of random streams
 
 
 class CorruptedSource:
@@ -52,6 +52,14 @@ class CorruptedSource:
         pixels = noisy_pixels(shown.pixels, self._noise, self._noise_px, rng)
         corruption = {"condition": self._condition, "noise": self._noise, "noise_px": self._noise_px}
         return replace(shown, pixels=pixels, parameters={**shown.parameters, **corruption}) if pixels.any() else None
+
+    def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
+        """Return a mask of this source as it is shown at a frame: itself, unless it flickers."""
+        if self._noise != "flicker" or not mask.pixels.any():
+            return mask
+        key = (*view.scene_key, command.target_id, frame)
+        rng = np.random.default_rng(np.random.SeedSequence(_FLICKER_STREAM, spawn_key=key))
+        return replace(mask, pixels=noisy_pixels(mask.pixels, "shift", self._noise_px, rng))
 
     def _under_condition(self, view: MaskView, command: Command, rng: np.random.Generator) -> TargetMask | None:
         if self._condition == "zero":
@@ -106,7 +114,10 @@ def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:
 
 
 def noisy_pixels(inside: Pixels, noise: str, size_px: int, rng: np.random.Generator) -> Pixels:
-    """Return a mask (H, W) with an error of `MASK_NOISES` and of a size [px]; erosion may leave nothing of it."""
+    """Return a mask (H, W) with an error of `MASK_NOISES` and of a size [px]; erosion may leave nothing of it.
+
+    A mask that flickers has its error at each frame alone (`CorruptedSource.at_frame`).
+    """
     if noise == "shift":
         angle = rng.uniform(0.0, 2.0 * np.pi)
         rows, cols = np.nonzero(inside)

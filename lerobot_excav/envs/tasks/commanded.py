@@ -40,8 +40,8 @@ class CommandedEnv(WatchedEnv):
     _selection: Selection | None
     _commands: list[Command]
     _mask: TargetMask | None
-    _named_source: MaskSource  # the one that the settings name
-    _source: MaskSource  # of the present command
+    _named_source: CorruptedSource  # the one that the settings name
+    _source: CorruptedSource  # of the present command
     _frame: int
     _missing_frames: int
     _mask_fallbacks: int  # how often a source that chooses has left the choice to the planner
@@ -219,15 +219,17 @@ class CommandedEnv(WatchedEnv):
 
     @property
     def mask(self) -> TargetMask | None:
-        """The mask of the command, as shown; None if nothing was found, or pictures are left out."""
-        return self._mask
+        """The mask of the command, as shown now; None if nothing was found, or pictures are left out."""
+        if self._mask is None:
+            return None
+        return self._source.at_frame(self._mask, self, self.command, self._frame)
 
     @property
     def mask_missing(self) -> bool:
         """Whether nothing was found for the command, so that no action is carried out."""
         return self._shows_pixels and self._mask is None
 
-    def _give_command(self, target_id: int, source: MaskSource | None = None) -> None:
+    def _give_command(self, target_id: int, source: CorruptedSource | None = None) -> None:
         """Command a target, shown by the source that the settings name unless by another."""
         command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
         self._commands.append(command)
@@ -326,7 +328,7 @@ class CommandedEnv(WatchedEnv):
         require(len(covered_w) > 0, "the mask covers nothing to act on; mark soil, or a block")
         return self._point(self._target_at(covered_w.mean(axis=0)), self._corrupted(PointedSource(pixels)))
 
-    def _point(self, target_id: int, source: MaskSource) -> Seen:
+    def _point(self, target_id: int, source: CorruptedSource) -> Seen:
         """Command a target by a source's mask; without one, everything stays as it was."""
         commands, mask = list(self._commands), None
         self._commands.append(Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame))
@@ -344,12 +346,12 @@ class CommandedEnv(WatchedEnv):
         return self._observe(), self._info(is_over=False)
 
     @property
-    def _pointing_source(self) -> MaskSource:
+    def _pointing_source(self) -> CorruptedSource:
         """What shows a target that a person commands: the source of the settings, unless that one chooses itself."""
         chooses = chooses_target(self.settings.mask_source)
         return self._corrupted(GeometrySource()) if chooses else self._named_source
 
-    def _corrupted(self, source: MaskSource) -> MaskSource:
+    def _corrupted(self, source: MaskSource) -> CorruptedSource:
         """Return a source under the condition and with the noise of the settings."""
         settings = self.settings
         return CorruptedSource(

@@ -5,7 +5,7 @@ processes, pipes and copies of `AsyncVectorEnv`. What a world does depends on it
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
 from pkgutil import resolve_name
@@ -15,18 +15,17 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import iterate
-from numpy.typing import NDArray
 
 from lerobot_excav.envs.tasks.registry import task_spec
-from lerobot_excav.errors import require_choice, require_integer
+from lerobot_excav.errors import require, require_choice, require_integer
 
 AUTORESET_MODES = tuple(mode.value for mode in AutoresetMode)
 
 
-class ManyWorlds(SyncVectorEnv[Any, Any]):
+class ManyWorlds(SyncVectorEnv):
     """Worlds of one task; what `gym.make_vec("lerobot_excav/…", num_envs=n)` makes.
 
-    Everything that is seen and returned is as with Gymnasium's `SyncVectorEnv` of the same environments, bit by bit.
+    Observations, rewards, ends and infos are those of Gymnasium's `SyncVectorEnv` of the same environments, bit by bit.
 
     Args:
         num_envs: How many worlds.
@@ -56,44 +55,50 @@ class ManyWorlds(SyncVectorEnv[Any, Any]):
         make_env = resolve_name(task_spec("task", task).env_entry)
         self._pool = ThreadPoolExecutor(max_workers=min(threads, num_envs), thread_name_prefix="world")
         self._worlds = [_Ahead(make_env(task=task, **settings), self._pool) for _ in range(num_envs)]
-        self._has_ended: NDArray[np.bool_] = np.zeros(num_envs, dtype=bool)
         makers: list[Callable[[], gym.Env[Any, Any]]] = [partial(_itself, world) for world in self._worlds]
         super().__init__(makers, autoreset_mode=autoreset_mode)
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset every world, or those of `options["reset_mask"]`, all at the same time."""
+        seeds, chosen = _seeds(seed, self.num_envs), _chosen(options, self.num_envs)
         told = None if options is None else {name: value for name, value in options.items() if name != "reset_mask"}
-        mask = (options or {}).get("reset_mask")
-        chosen = np.ones(self.num_envs, dtype=bool) if mask is None else mask
-        if np.shape(chosen) == (self.num_envs,):  # Gymnasium refuses others
-            for i in np.flatnonzero(chosen).tolist():
-                self._worlds[i].begin_reset(seed=_seed_of(i, seed), options=told)
-            self._has_ended[chosen] = False
-        return self._when_all_are_done(lambda: super(ManyWorlds, self).reset(seed=seed, options=options))
+        calls = {i: partial(self._worlds[i].env.reset, seed=seeds[i], options=told) for i in chosen if seeds}
+        return self._ahead(calls, lambda: super(ManyWorlds, self).reset(seed=seed, options=options))
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Let a frame pass in every world, in as many at the same time as there are threads."""
-        begins_again = self._has_ended & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
-        each = zip(self._worlds, iterate(self.action_space, actions), begins_again, strict=True)
-        for world, action, is_new in each:
-            world.begin_reset() if is_new else world.begin_step(action)
-        stepped = self._when_all_are_done(lambda: super(ManyWorlds, self).step(actions))
-        self._has_ended = stepped[2] | stepped[3]
-        return stepped
+        """Let a frame pass in every world, in as many at the same time as there are threads.
 
-    def _when_all_are_done[Result](self, collect: Callable[[], Result]) -> Result:
-        """Wait for what was begun, then collect it; where one world fails, nothing of the others is left for later."""
-        wait([world.begun for world in self._worlds if world.begun is not None])
+        Raises:
+            ConfigurationError: There are not as many actions as worlds, or a world refuses its own.
+        """
+        each = list(iterate(self.action_space, actions))
+        require(len(each) == self.num_envs, f"{len(each)} actions were given; give {self.num_envs}, one to each world")
+        begins_again = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        calls: dict[int, Callable[[], Any]] = {
+            i: world.env.reset if begins_again[i] else partial(world.env.step, each[i])
+            for i, world in enumerate(self._worlds)
+        }
+        return self._ahead(calls, lambda: super(ManyWorlds, self).step(actions))
+
+    def _ahead[Result](self, calls: Mapping[int, Callable[[], Any]], collect: Callable[[], Result]) -> Result:
+        """Begin calls of worlds, by their numbers, then let Gymnasium collect what came of them.
+
+        Where one fails, the others come to their end, and nothing of them is left for later.
+        """
         try:
+            for i, call in calls.items():
+                self._worlds[i].begin(call)
             return collect()
         finally:
+            wait([world.begun for world in self._worlds if world.begun is not None])
             for world in self._worlds:
                 world.begun = None
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the worlds, then their threads."""
+        """Let the threads come to their end, then close the worlds."""
+        if hasattr(self, "_pool"):  # it was made with settings that are possible
+            self._pool.shutdown(cancel_futures=True)
         super().close_extras(**kwargs)
-        self._pool.shutdown()
 
 
 class _Ahead(gym.Wrapper[Any, Any, Any, Any]):
@@ -104,11 +109,8 @@ class _Ahead(gym.Wrapper[Any, Any, Any, Any]):
         self._pool = pool
         self.begun: Future[Any] | None = None
 
-    def begin_step(self, action: Any) -> None:
-        self.begun = self._pool.submit(self.env.step, action)
-
-    def begin_reset(self, **how: Any) -> None:
-        self.begun = self._pool.submit(self.env.reset, **how)
+    def begin(self, call: Callable[[], Any]) -> None:
+        self.begun = self._pool.submit(call)
 
     def step(self, action: Any) -> Any:
         return self._result() if self.begun else self.env.step(action)
@@ -126,11 +128,20 @@ def _itself(world: _Ahead) -> _Ahead:
     return world
 
 
-def _seed_of(index: int, seed: Any) -> int | None:
-    """Return the seed of one world, as Gymnasium spells it out."""
+def _seeds(seed: Any, worlds: int) -> Sequence[int | None]:
+    """Return the seed of every world, as Gymnasium spells it out; none if it refuses them."""
     if seed is None or isinstance(seed, int):
-        return None if seed is None else seed + index
-    return seed[index] if index < len(seed) else None  # Gymnasium refuses lists of another length
+        return [None if seed is None else seed + i for i in range(worlds)]
+    return seed if len(seed) == worlds else []
+
+
+def _chosen(options: dict[str, Any] | None, worlds: int) -> list[int]:
+    """Return the numbers of the worlds to be reset; none if Gymnasium refuses the mask that chooses them."""
+    if options is None or "reset_mask" not in options:
+        return list(range(worlds))
+    mask = options["reset_mask"]
+    is_sound = isinstance(mask, np.ndarray) and mask.shape == (worlds,) and mask.dtype == np.bool_
+    return np.flatnonzero(mask).tolist() if is_sound else []
 
 
 def _usable_cores() -> int:

@@ -227,14 +227,13 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
 
     def _draw(self, camera: str) -> NDArray[np.uint8]:
         if camera == "target_mask":
-            empty = np.zeros((*self.settings.observation_size, 3), np.uint8)
-            return empty if self._mask is None else self._mask.img
+            empty, mask = np.zeros((*self.settings.observation_size, 3), np.uint8), self.mask
+            return empty if mask is None else mask.img
         if camera != "main":
             return self.renderer.render(camera)
         picture = self.picture()
-        if not self.settings.target_overlay or self._mask is None:
-            return picture
-        return tinted(picture, self._mask.pixels)
+        mask = self.mask if self.settings.target_overlay else None
+        return picture if mask is None else tinted(picture, mask.pixels)
 
     def _info(self, *, is_over: bool) -> dict[str, Any]:
         info = {

@@ -141,3 +141,11 @@ def test_an_empty_mask_is_found_unless_it_was_asked_for(tmp_path, monkeypatch, w
     monkeypatch.setattr(toy_reach.spec.ReachSettings, "mask_words", words)
     record_toy(tmp_path / "d", scenes=1, targets=1, env={"mask_condition": "zero"})
     assert problems(tmp_path / "d") == {0: "the target mask is empty from frame 0 on"}
+
+
+def test_masks_that_flicker_pass_where_the_dataset_says_so(tmp_path):
+    root = tmp_path / "flickers"
+    record_toy(root, scenes=1, targets=2, env={"mask_noise": "flicker", "mask_noise_px": 2})
+    assert problems(root, replays=2) == {}
+    masks = [frame[MASK].numpy().tobytes() for frame in load(root)]
+    assert len(set(masks)) > len(masks) // 2

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.corrupted import CorruptedSource, moved_elsewhere, noisy_pixels
+from lerobot_excav.envs.masks.corrupted import MASK_NOISES, CorruptedSource, moved_elsewhere, noisy_pixels
 from lerobot_excav.envs.masks.oracle import OracleSource
 from lerobot_excav.envs.masks.source import TargetMask
 from lerobot_excav.errors import ConfigurationError, ExcavError
@@ -174,3 +174,28 @@ def test_an_empty_mask_counts_as_nothing(settings):
 def test_what_is_not_a_mask_of_the_pictures_size_is_refused(returned, named):
     with pytest.raises(ConfigurationError, match=named):
         corrupted(returned)
+
+
+def flickering(target_id, frame, *, noise="flicker", scene_id=0):
+    view, source = View(scene_id, ()), CorruptedSource(OracleSource(), condition="correct", noise=noise, noise_px=3)
+    view.commanded = target_id
+    return source.at_frame(source.mask(view, command(target_id)), view, command(target_id), frame).pixels
+
+
+def test_a_mask_that_flickers_moves_by_its_size_around_its_place():
+    middle = np.argwhere(TARGETS[2]).mean(axis=0)
+    shifts = [np.argwhere(flickering(2, frame)).mean(axis=0) - middle for frame in range(200)]
+    assert np.abs(np.linalg.norm(shifts, axis=1) - 3.0).max() < 0.75  # whole pixels
+    assert np.linalg.norm(np.mean(shifts, axis=0)) < 0.6  # no direction is preferred
+    assert len({tuple(shift) for shift in shifts}) > 8
+
+
+def test_how_a_mask_flickers_depends_on_scene_target_and_frame_alone():
+    assert np.array_equal(flickering(2, 5), flickering(2, 5))
+    others = [flickering(2, 6), flickering(2, 5, scene_id=1), flickering(2, 7)]
+    assert any(not np.array_equal(other, flickering(2, 5)) for other in others)
+
+
+@pytest.mark.parametrize("noise", [noise for noise in MASK_NOISES if noise not in ("none", "flicker")])
+def test_other_noise_stays_as_it_is_from_frame_to_frame(noise):
+    assert np.array_equal(flickering(1, 0, noise=noise), flickering(1, 9, noise=noise))

@@ -81,7 +81,7 @@ def test_no_more_worlds_step_at_the_same_time_than_there_are_threads():
         env.env.step = lambda action, step=step: (names.add(threading.current_thread().name), step(action))[1]
     vector.step(np.zeros(vector.action_space.shape, np.float32))
     vector.close()
-    assert len(names) == 1
+    assert names == {"world_0"}
 
 
 def test_seeds_may_be_one_for_each_world_and_some_worlds_may_be_reset_alone():
@@ -102,17 +102,64 @@ def test_options_reach_every_world():
     vector.close()
 
 
-def test_a_world_that_fails_leaves_nothing_of_the_others_for_the_next_step():
+def frames_of(vector):
+    return [env.unwrapped._frame for env in vector.envs]
+
+
+def wrong_actions(vector):
+    """Return actions that a world refuses, and too few of them."""
+    bad = np.zeros(vector.action_space.shape, np.float32)
+    bad[0] = np.nan
+    return bad, bad[1:]
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["one is not a number", "one is missing"])
+def test_after_a_step_that_fails_the_worlds_step_as_before(which):
     vector = make("FR5Grasp-v0")
     vector.reset(seed=0)
-    good, bad = np.zeros(vector.action_space.shape, np.float32), np.zeros(vector.action_space.shape, np.float32)
-    bad[0] = np.nan
     with pytest.raises(ConfigurationError, match="action"):
-        vector.step(bad)
+        vector.step(wrong_actions(vector)[which])
     assert all(env.begun is None for env in vector.envs)
-    frames = [env.unwrapped._frame for env in vector.envs]
-    vector.step(good)
-    assert [env.unwrapped._frame for env in vector.envs] == [frame + 1 for frame in frames]
+    before = frames_of(vector)
+    vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert frames_of(vector) == [frame + 1 for frame in before]
+    vector.close()
+
+
+@pytest.mark.parametrize("wrong", [{"seed": [1]}, {"options": {"reset_mask": [True, False, False]}}])
+def test_a_reset_that_is_refused_leaves_nothing_behind(wrong):
+    vector = make("FR5Grasp-v0")
+    vector.reset(seed=0)
+    for _ in range(LENGTH):
+        *_, truncated, _ = vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert truncated.all()
+    with pytest.raises((ValueError, TypeError)):
+        vector.reset(**wrong)
+    *_, truncated, _ = vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert frames_of(vector) == [0] * WORLDS  # the next episode has begun
+    assert not truncated.any()
+    vector.close()
+
+
+def test_worlds_that_ended_wait_for_a_reset_where_none_is_made_by_itself():
+    vector = make("FR5Grasp-v0", autoreset_mode="Disabled")
+    vector.reset(seed=0)
+    for _ in range(LENGTH):
+        *_, truncated, _ = vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert truncated.all()
+    vector.reset(seed=1, options={"reset_mask": truncated})
+    assert frames_of(vector) == [0] * WORLDS
+    vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert frames_of(vector) == [1] * WORLDS
+    vector.close()
+
+
+def test_it_can_be_closed_while_worlds_are_at_work_and_twice():
+    vector = make(**FAST)
+    vector.reset(seed=0)
+    for world in vector.envs:
+        world.begin(lambda world=world: world.env.step(np.zeros(4, np.float32)))
+    vector.close()
     vector.close()
 
 
