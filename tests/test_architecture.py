@@ -28,7 +28,7 @@ LAYERS = [
     ["policies"],
 ]
 SHARED = {"errors", "run_lock", "setting", "whole_file"}
-DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks", "clicks"]
+DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks", "clicks", "alignment"]
 FREE = {"plugin", "scripts.export"}
 
 

@@ -17,6 +17,7 @@ COMMANDS = {
     "qc": "check a dataset and replay a sample of its episodes",
     "card": "write what is in a dataset into its README, with a picture, and upload it if asked to",
     "masks": "give a dataset masks of another source, or its first ones",
+    "alignment": "write into a recording of the test bed how old what was seen was, and count late frames",
     "segmenter": "train or measure the small network that turns a click into a mask",
     "operator": "let the scripted operator play scenes, for the efficiency in reports",
     "report": "make the table of one or more evaluations, with intervals and comparisons",

@@ -222,7 +222,7 @@ TASK = {
     "mask_source": one_of("oracle", "geometry", "manual", "grounded_sam"),
     "mask_options": optional(text),
     "mask_condition": one_of("correct", "zero", "random", "mismatched"),
-    "mask_noise": one_of("shift", "erode", "dilate").beside(mask_noise_px=3),  # none has no size
+    "mask_noise": one_of("shift", "erode", "dilate", "flicker").beside(mask_noise_px=3),  # none has no size
     "mask_noise_px": whole(1, 1024).beside(mask_noise="shift"),
     "target_overlay": flag,
 }
@@ -328,6 +328,7 @@ COMMAND_TABLES = {
         **{**SCENES, **WORK, "json": optional(path)},
         "only": optional(one_of("environment", "writing", "demos")),
     },
+    "alignment": dict.fromkeys(("dataset", "log", "out"), optional(path)),
     "masks": {
         **dict.fromkeys(("dataset", "out"), optional(path)),
         "source": optional(one_of("oracle", "click", "geometry", "manual", "grounded_sam", "vlm_dig")),

@@ -1,0 +1,1 @@
+"""How old what was seen was when an action was chosen: columns of recordings of a real machine."""
