@@ -1,0 +1,107 @@
+"""Let the excavator's policy drive the emulated test bed behind wires that are late or lose datagrams; count successes.
+
+Stock `lerobot-rollout` drives `lerobot-excav testbed-emulator` in real time, on scenes of `val`. Finished cycles are
+kept in FILE, and the same command goes on after an interruption. Run it with nothing else at work: ticks that the
+machine could not make in time are counted with every condition.
+
+Examples:
+  python -m validation.testbed_wire
+      12 cycles a condition (half an hour), then the table
+  python -m validation.testbed_wire --cycles=4 --delays=0,200 --losses= --file=outputs/wire.jsonl
+      a quick look
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.evaluation.statistics import wilson_interval
+from validation.finished_plays import read_finished
+from validation.testbed_wire.rollout import Wire, cycles_behind, late_ticks
+
+FILE = Path("results", "scoop", "testbed_wire.jsonl")
+CHECKPOINT = Path("checkpoints", "excavator_mask_act")
+DELAYS_MS, LOSSES_PERCENT = (0, 25, 50, 100), (5, 20, 50)
+SCENE_SET = "val"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        "python -m validation.testbed_wire",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--cycles", type=int, default=12, help="cycles per condition, a multiple of 4 (default: 12)")
+    parser.add_argument("--delays", type=_whole, default=DELAYS_MS, help=f"each way [ms] (default: {DELAYS_MS})")
+    parser.add_argument("--losses", type=_whole, default=LOSSES_PERCENT, help=f"[%%] (default: {LOSSES_PERCENT})")
+    parser.add_argument("--policy", type=Path, default=CHECKPOINT, help=f"checkpoint (default: {CHECKPOINT})")
+    parser.add_argument("--file", type=Path, default=FILE, help=f"finished cycles (default: {FILE})")
+    given = parser.parse_args(arguments)
+    if given.cycles < 4 or given.cycles % SCOOP.target_count:
+        parser.error(f"--cycles={given.cycles}; allowed: multiples of {SCOOP.target_count}, which a scene has targets")
+    wires = [Wire(delay, 0.0) for delay in given.delays] + [Wire(0, share / 100) for share in given.losses]
+    for wire in wires:
+        _play(wire, given.policy, given.cycles, given.file)
+    played = read_finished(given.file)
+    print("\n".join(table([(wire, _of(played, wire)[: given.cycles]) for wire in wires])))
+    return 0
+
+
+def _of(played: Sequence[dict[str, Any]], wire: Wire) -> list[dict[str, Any]]:
+    return [cycle for cycle in played if (cycle["delay_ms"], cycle["loss"]) == wire]
+
+
+def _play(wire: Wire, policy: Path, cycles: int, path: Path) -> None:
+    """Play what is missing of a condition; a scene that was interrupted is played again from its first target."""
+    scenes = len(_of(read_finished(path), wire)) // SCOOP.target_count
+    missing = cycles - scenes * SCOOP.target_count
+    if missing <= 0:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        found = []
+        options: dict[str, Any] = {"checkpoint": policy, "scene_set": SCENE_SET, "first_scene": scenes}
+        for cycle in cycles_behind(wire, count=missing, folder=Path(folder), **options):
+            found.append(cycle)
+            words = "success" if cycle["is_success"] else "no success"
+            print(f"{wire.delay_ms} ms, {wire.loss:.0%} lost: cycle {len(found)} of {missing}: {words}", flush=True)
+        late = late_ticks(Path(folder))
+    keys = ("scene_id", "target_id", "simulation_version", "is_success", "target_success", "retained_mass_kg")
+    lines = [
+        {**wire._asdict(), **{name: cycle[name] for name in keys}, "late_ticks_of_condition": late} for cycle in found
+    ]
+    with path.open("a", encoding="utf-8") as file:
+        file.write("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def table(conditions: Sequence[tuple[Wire, Sequence[dict[str, Any]]]]) -> list[str]:
+    """Return success and hits by condition, as lines of a table."""
+    lines = ["| delay each way | lost | success | region hit | retained |", "|---|---|---|---|---|"]
+    for wire, cycles in conditions:
+        if not cycles:
+            continue
+        n, rates = len(cycles), []
+        for name in ("is_success", "target_success"):
+            count = sum(bool(cycle[name]) for cycle in cycles)
+            interval = wilson_interval(count, n)
+            rates.append(f"{count} of {n}, {count / n:.0%} [{interval.low:.0%}, {interval.high:.0%}]")
+        mass_kg = sum(cycle["retained_mass_kg"] for cycle in cycles) / n
+        lines.append(f"| {wire.delay_ms} ms | {wire.loss:.0%} | {rates[0]} | {rates[1]} | {mass_kg:.0f} kg |")
+    return lines
+
+
+def _whole(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(",") if part)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}; give whole numbers, as in 0,50") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
