@@ -34,8 +34,9 @@ def run(arguments: AlignmentArguments) -> int:
     counts = write_aligned_copy(arguments.root, out, log=log)
     share = counts.late_frames / counts.frames
     print(f"{counts.late_frames} of {counts.frames} frames ({share:.1%}) saw something too old when they acted")
-    print(f"  oldest picture {counts.worst_image_ms:.0f} ms, of {IMAGE_LIMIT_MS:.0f} allowed")
-    print(f"  oldest state   {counts.worst_state_ms:.0f} ms, of {STATE_LIMIT_MS:.0f} allowed")
+    oldest = "of unknown age" if counts.worst_image_ms < 0 else f"{counts.worst_image_ms:.0f} ms"
+    print(f"  oldest picture {oldest}, of {IMAGE_LIMIT_MS:.0f} ms allowed")
+    print(f"  oldest state   {counts.worst_state_ms:.0f} ms, of {STATE_LIMIT_MS:.0f} ms allowed")
     if counts.late_episodes:
         print(f"  in episodes {', '.join(map(str, counts.late_episodes))}")
     print(f"{counts.other_frames} of {counts.frames} frames: the machine did something else than the action says")

@@ -142,7 +142,10 @@ class Slurm:
                 self.pull_the_plug(node)
         for process in reversed(self._processes.values()):
             process.terminate()
-            process.wait(timeout=30.0)
+            try:
+                process.wait(timeout=30.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
         self._processes.clear()
 
 

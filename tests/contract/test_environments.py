@@ -161,16 +161,16 @@ def test_mask_noise_changes_the_mask_alone(gym_id, right, noise, growth):
     assert_only_mask_differs(shown, right)
 
 
-def masks_of(gym_id, **settings):
+def flickering_masks(gym_id):
     """Return the masks of some frames of the episode that `trace` plays."""
-    env = made(gym_id, mask_noise="flicker", mask_noise_px=3, **settings)
+    env = made(gym_id, mask_noise="flicker", mask_noise_px=3)
     masks = [observation["pixels/target_mask"] for observation, _ in play(env)]
     env.close()
     return masks
 
 
 def test_a_mask_that_flickers_lies_elsewhere_at_every_frame_and_is_the_same_again(gym_id, trace):
-    masks, again = masks_of(gym_id), masks_of(gym_id)
+    masks, again = flickering_masks(gym_id), flickering_masks(gym_id)
     assert all(map(np.array_equal, masks, again))
     assert len({mask.tobytes() for mask in masks}) > FRAMES // 2
     right = trace[0][0]["pixels/target_mask"]

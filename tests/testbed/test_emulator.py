@@ -230,3 +230,9 @@ def test_sensors_are_noisy_as_asked_and_the_seed_decides():
             seen.append(link.heard().state.joint_pos)
             time.sleep(0.03)
         assert 0.006 < np.std(np.unique(seen, axis=0), axis=0).mean() < 0.014
+
+
+def test_a_mask_that_flickers_lies_elsewhere_at_every_tick():
+    seen = set()
+    with emulated({"mask_noise": "flicker", "mask_noise_px": 3}) as served:
+        until(lambda: seen.add(served.site._mask_img().tobytes()) or len(seen) > 4)

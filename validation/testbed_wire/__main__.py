@@ -1,8 +1,8 @@
 """Let the excavator's policy drive the emulated test bed behind wires that are late or lose datagrams; count successes.
 
-Stock `lerobot-rollout` drives `lerobot-excav testbed-emulator` in real time, on scenes of `val`. Finished cycles are
-kept in FILE, and the same command goes on after an interruption. Run it with nothing else at work: ticks that the
-machine could not make in time are counted with every condition.
+Stock `lerobot-rollout` drives `lerobot-excav testbed-emulator` in real time, on scenes of `val`. Finished scenes, of
+four cycles each, are kept in FILE, and the same command goes on after an interruption. Run it with nothing else at
+work: it tells how many ticks of every condition could not be made in time.
 
 Examples:
   python -m validation.testbed_wire
@@ -28,6 +28,7 @@ FILE = Path("results", "scoop", "testbed_wire.jsonl")
 CHECKPOINT = Path("checkpoints", "excavator_mask_act")
 DELAYS_MS, LOSSES_PERCENT = (0, 25, 50, 100), (5, 20, 50)
 SCENE_SET = "val"
+KEPT = ("scene_id", "target_id", "simulation_version", "is_success", "target_success", "retained_mass_kg")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,39 +46,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.cycles < 4 or given.cycles % SCOOP.target_count:
         parser.error(f"--cycles={given.cycles}; allowed: multiples of {SCOOP.target_count}, which a scene has targets")
+    if max(given.losses, default=0) > 100 or min((*given.losses, *given.delays), default=0) < 0:
+        parser.error("--losses and --delays; allowed: 0 to 100 %, and 0 ms and above")
     wires = [Wire(delay, 0.0) for delay in given.delays] + [Wire(0, share / 100) for share in given.losses]
     for wire in wires:
         _play(wire, given.policy, given.cycles, given.file)
     played = read_finished(given.file)
-    print("\n".join(table([(wire, _of(played, wire)[: given.cycles]) for wire in wires])))
+    print("\n".join(table([(wire, _of(played, wire, given.policy.name)[: given.cycles]) for wire in wires])))
     return 0
 
 
-def _of(played: Sequence[dict[str, Any]], wire: Wire) -> list[dict[str, Any]]:
-    return [cycle for cycle in played if (cycle["delay_ms"], cycle["loss"]) == wire]
+def _of(played: Sequence[dict[str, Any]], wire: Wire, policy: str) -> list[dict[str, Any]]:
+    """Return the cycles of a condition, each once, in the order of scenes and targets."""
+    key = (*wire, policy)
+    cycles = [cycle for cycle in played if (cycle["delay_ms"], cycle["loss"], cycle["policy"]) == key]
+    by_start = {(cycle["scene_id"], cycle["target_id"]): cycle for cycle in cycles}
+    return [by_start[start] for start in sorted(by_start)]
 
 
 def _play(wire: Wire, policy: Path, cycles: int, path: Path) -> None:
-    """Play what is missing of a condition; a scene that was interrupted is played again from its first target."""
-    scenes = len(_of(read_finished(path), wire)) // SCOOP.target_count
+    """Play what is missing of a condition; a scene is kept when its four cycles are over."""
+    scenes = len(_of(read_finished(path), wire, policy.name)) // SCOOP.target_count
     missing = cycles - scenes * SCOOP.target_count
     if missing <= 0:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        found = []
+        scene: list[dict[str, Any]] = []
         options: dict[str, Any] = {"checkpoint": policy, "scene_set": SCENE_SET, "first_scene": scenes}
-        for cycle in cycles_behind(wire, count=missing, folder=Path(folder), **options):
-            found.append(cycle)
+        for number, cycle in enumerate(cycles_behind(wire, count=missing, folder=Path(folder), **options), start=1):
+            scene.append({**wire._asdict(), "policy": policy.name, **{name: cycle[name] for name in KEPT}})
             words = "success" if cycle["is_success"] else "no success"
-            print(f"{wire.delay_ms} ms, {wire.loss:.0%} lost: cycle {len(found)} of {missing}: {words}", flush=True)
-        late = late_ticks(Path(folder))
-    keys = ("scene_id", "target_id", "simulation_version", "is_success", "target_success", "retained_mass_kg")
-    lines = [
-        {**wire._asdict(), **{name: cycle[name] for name in keys}, "late_ticks_of_condition": late} for cycle in found
-    ]
-    with path.open("a", encoding="utf-8") as file:
-        file.write("".join(json.dumps(line) + "\n" for line in lines))
+            print(f"{wire.delay_ms} ms, {wire.loss:.0%} lost: cycle {number} of {missing}: {words}", flush=True)
+            if len(scene) == SCOOP.target_count:
+                with path.open("a", encoding="utf-8") as file:
+                    file.write("".join(json.dumps(line) + "\n" for line in scene))
+                scene.clear()
+        print(late_ticks(Path(folder)), flush=True)
 
 
 def table(conditions: Sequence[tuple[Wire, Sequence[dict[str, Any]]]]) -> list[str]:

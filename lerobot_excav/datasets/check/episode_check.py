@@ -139,6 +139,15 @@ def action_problems(episode: EpisodeTable) -> Iterator[str]:
             yield f"action {name} reaches {worst:.3g}; allowed are {low:.3g} to {high:.3g}"
 
 
+def _picture_of_mask_problems(episode: EpisodeTable, frame: int) -> Iterator[str]:
+    mask_img = episode.image(MASK_KEY, frame)
+    if not np.isin(mask_img, (0, 255)).all():
+        values = np.unique(mask_img)[:4].tolist()
+        yield f"the target mask is not binary at frame {frame}: it holds {values}; allowed are 0 and 255"
+    elif not mask_img.any() and "zero" not in episode.mask_changes:
+        yield f"the target mask is empty from frame {frame} on"
+
+
 def _flickers(episode: EpisodeTable) -> bool:
     return any(change.startswith("flicker ") for change in episode.mask_changes)
 
@@ -156,12 +165,9 @@ def mask_problems(episode: EpisodeTable) -> Iterator[str]:
         is_other = start > 0 and targets[start] != targets[start - 1]
         if is_other and digests[start] == digests[start - 1] and not _corruptions(episode):
             yield f"the command changes at frame {start}, though the target mask does not"
-        mask_img = episode.image(MASK_KEY, start)
-        if not np.isin(mask_img, (0, 255)).all():
-            values = np.unique(mask_img)[:4].tolist()
-            yield f"the target mask is not binary at frame {start}: it holds {values}; allowed are 0 and 255"
-        elif not mask_img.any() and "zero" not in episode.mask_changes:
-            yield f"the target mask is empty from frame {start} on"
+        shown = {digest: frame for frame, digest in reversed([*enumerate(digests)][start:end])}
+        for frame in sorted(shown.values()):
+            yield from _picture_of_mask_problems(episode, frame)
 
 
 def scene_problems(episodes: list[EpisodeTable]) -> dict[int, str]:

@@ -69,10 +69,16 @@ class ManyWorlds(SyncVectorEnv):
         """Let a frame pass in every world, in as many at the same time as there are threads.
 
         Raises:
-            ConfigurationError: There are not as many actions as worlds, or a world refuses its own.
+            ConfigurationError: There are not as many actions as worlds, a world refuses its own, or one has ended and
+                is not reset by itself.
         """
         each = list(iterate(self.action_space, actions))
         require(len(each) == self.num_envs, f"{len(each)} actions were given; give {self.num_envs}, one to each world")
+        require(
+            self.autoreset_mode != AutoresetMode.DISABLED or not self._autoreset_envs.any(),
+            f"the episodes of worlds {np.flatnonzero(self._autoreset_envs).tolist()} are over, and "
+            "autoreset_mode='Disabled' begins none by itself; call reset(options={'reset_mask': ...}) first",
+        )
         begins_again = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         calls: dict[int, Callable[[], Any]] = {
             i: world.env.reset if begins_again[i] else partial(world.env.step, each[i])

@@ -190,10 +190,16 @@ def test_a_mask_that_flickers_moves_by_its_size_around_its_place():
     assert len({tuple(shift) for shift in shifts}) > 8
 
 
-def test_how_a_mask_flickers_depends_on_scene_target_and_frame_alone():
-    assert np.array_equal(flickering(2, 5), flickering(2, 5))
-    others = [flickering(2, 6), flickering(2, 5, scene_id=1), flickering(2, 7)]
-    assert any(not np.array_equal(other, flickering(2, 5)) for other in others)
+def ways(target_id, frames=range(10), **others):
+    """Return by how much a mask is moved at some frames [px]."""
+    middle = np.argwhere(TARGETS[target_id]).mean(axis=0)
+    return [tuple(np.argwhere(flickering(target_id, frame, **others)).mean(axis=0) - middle) for frame in frames]
+
+
+def test_how_a_mask_flickers_depends_on_scene_target_and_frame():
+    assert ways(2) == ways(2)
+    for others in (ways(1), ways(2, scene_id=1), ways(2, frames=range(1, 11))):
+        assert others != ways(2)
 
 
 @pytest.mark.parametrize("noise", [noise for noise in MASK_NOISES if noise not in ("none", "flicker")])

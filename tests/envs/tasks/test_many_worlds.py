@@ -147,6 +147,9 @@ def test_worlds_that_ended_wait_for_a_reset_where_none_is_made_by_itself():
     for _ in range(LENGTH):
         *_, truncated, _ = vector.step(np.zeros(vector.action_space.shape, np.float32))
     assert truncated.all()
+    with pytest.raises(ConfigurationError, match="reset_mask"):
+        vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert frames_of(vector) == [LENGTH] * WORLDS
     vector.reset(seed=1, options={"reset_mask": truncated})
     assert frames_of(vector) == [0] * WORLDS
     vector.step(np.zeros(vector.action_space.shape, np.float32))

@@ -10,6 +10,7 @@ from validation.testbed_wire.rollout import Wire
 def cycle(wire, scene_id, target_id, *, is_success):
     return {
         **wire._asdict(),
+        "policy": "excavator_mask_act",
         **{"scene_id": scene_id, "target_id": target_id, "simulation_version": SCOOP.simulation_version},
         **{"is_success": is_success, "target_success": True, "retained_mass_kg": 400.0},
     }
@@ -34,7 +35,7 @@ def test_what_is_finished_is_not_played_again_and_the_rest_goes_on_at_its_scene(
         yield from (cycle(wire, first_scene + i // 4, i % 4, is_success=True) for i in range(count))
 
     monkeypatch.setattr(study, "cycles_behind", played)
-    monkeypatch.setattr(study, "late_ticks", lambda folder: 0)
+    monkeypatch.setattr(study, "late_ticks", lambda folder: "0 ticks took longer")
     options = ["--delays=0", "--losses=5", f"--file={tmp_path / 'wire.jsonl'}"]
     assert study.main(["--cycles=4", *options]) == 0
     assert study.main(["--cycles=12", *options]) == 0
@@ -42,6 +43,17 @@ def test_what_is_finished_is_not_played_again_and_the_rest_goes_on_at_its_scene(
     lines = [json.loads(line) for line in (tmp_path / "wire.jsonl").read_text().splitlines()]
     assert sorted({line["scene_id"] for line in lines}) == [0, 1, 2]
     assert "12 of 12, 100%" in capsys.readouterr().out
+
+
+def test_another_policy_is_another_study(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "wire.jsonl"
+    path.write_text("".join(json.dumps(cycle(Wire(0, 0.0), 0, t, is_success=True)) + "\n" for t in range(4)))
+    monkeypatch.setattr(study, "late_ticks", lambda folder: "")
+    monkeypatch.setattr(
+        study, "cycles_behind", lambda wire, **_: (cycle(wire, 0, t, is_success=False) for t in range(4))
+    )
+    assert study.main(["--cycles=4", "--delays=0", "--losses=", "--policy=another", f"--file={path}"]) == 0
+    assert "0 of 4, 0%" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("cycles", ["0", "5"])
