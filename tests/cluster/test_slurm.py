@@ -17,7 +17,7 @@ from .one_machine import PROGRAMS, Slurm
 
 ROOT = Path(__file__).parents[2]
 PROFILE = ROOT / "workflows/excavator/profiles/slurm"
-SIZES = ("paired_scenes=4", "stages=0", "data_shards=4", "scoops=4", "play_shards=2")
+SIZES = ("paired_scenes=4", "stages=0", "data_shards=4", "scoops=2", "play_shards=2")
 DATA, ROW = "outputs/trial/data/paired", "outputs/page/metrics/scoop_paired_token-1000.jsonl"
 RANDOM_NAMES = ("evaluation", "started_at")  # of an evaluation, not of what it measured
 
@@ -28,7 +28,8 @@ def workflow(folder, *options):
     shutil.copytree(ROOT / "checkpoints/excavator_mask_act", landed / "paired_token-1000")
     config = ["--config", "out=outputs/trial", "results=outputs/page", *SIZES]
     snakefile = ["-s", str(ROOT / "workflows/excavator/Snakefile"), "-d", str(folder)]
-    return [sys.executable, "-m", "snakemake", *snakefile, *options, DATA, ROW, *config]
+    # Targets come first: what takes several words would take them, too.
+    return [sys.executable, "-m", "snakemake", DATA, ROW, *snakefile, *config, *options]
 
 
 def environment(**more):
@@ -109,7 +110,7 @@ def test_the_dataset_is_the_same_in_every_value_and_pixel(undisturbed, disturbed
 
 def test_the_row_is_the_same(undisturbed, disturbed):
     ours, theirs = row(disturbed.folder), row(undisturbed)
-    assert len(ours) == len(theirs) == 4
+    assert len(ours) == len(theirs) == 2
     for mine, other in zip(ours, theirs, strict=True):
         assert mine.keys() == other.keys()
         for name in other.keys() - set(RANDOM_NAMES):
