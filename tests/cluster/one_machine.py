@@ -3,6 +3,7 @@
 import os
 import re
 import secrets
+import shutil
 import signal
 import socket
 import subprocess
@@ -53,7 +54,8 @@ class Slurm:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf")}
+        conf = {"SLURM_CONF": str(folder / "slurm.conf"), "PATH": f"{folder}/bin{os.pathsep}{os.environ['PATH']}"}
+        self.environment = {**os.environ, **conf}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self) -> None:
@@ -63,6 +65,7 @@ class Slurm:
         key.write_bytes(secrets.token_bytes(128))
         key.chmod(0o400)
         self._write_configuration()
+        self._write_srun()
         files = [f"--{name}={self.folder}/munge.{name}" for name in ("socket", "pid-file", "log-file", "seed-file")]
         self._run("munged", f"--key-file={key}", "--foreground", "--force", *files)
         self._run("slurmctld", "-D", "-i")
@@ -82,6 +85,14 @@ class Slurm:
             host=host, port=free_port("127.0.0.1"), user=user, folder=self.folder, nodes="\n".join(lines)
         )
         (self.folder / "slurm.conf").write_text(text)
+
+    def _write_srun(self) -> None:
+        """Let jobs find the cluster: Snakemake's plugin takes away all variables of SLURM before it submits them."""
+        srun = self.folder / "bin" / "srun"
+        srun.parent.mkdir()
+        conf = self.environment["SLURM_CONF"]
+        srun.write_text(f'#!/bin/sh\nSLURM_CONF={conf} exec {shutil.which("srun")} "$@"\n')
+        srun.chmod(0o755)
 
     def _run(self, name: str, *arguments: str, program: str | None = None) -> None:
         with (self.folder / f"{name}.log").open("wb") as log:

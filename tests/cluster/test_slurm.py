@@ -32,9 +32,9 @@ def workflow(folder, *options):
     return [sys.executable, "-m", "snakemake", DATA, ROW, *snakefile, *config, *options]
 
 
-def environment(**more):
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), **more}
+def environment(of=os.environ):
+    path = f"{of['PATH']}{os.pathsep}{Path(sys.executable).parent}"
+    return {**of, "PATH": path, "PYTHONPATH": str(ROOT)}
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +74,8 @@ def disturbed(slurm, tmp_path_factory):
     hurried = ["--slurm-init-seconds-before-status-checks=5", "--slurm-no-account", "--slurm-status-command=squeue"]
     small = ["--default-resources", "mem_mb=1000", "runtime=60", "cpus_per_task=1"]
     command = workflow(folder, "--profile", str(PROFILE), "--latency-wait=10", *hurried, *small)
-    variables = {"SLURM_CONF": slurm.environment["SLURM_CONF"]}
     with (folder / "log").open("w") as log:
-        running = subprocess.Popen(command, env=environment(**variables), cwd=ROOT, stdout=log, stderr=log)
+        running = subprocess.Popen(command, env=environment(slurm.environment), cwd=ROOT, stdout=log, stderr=log)
         try:
             slurm.wait_for(lambda: running.poll() is not None or recorded_on(slurm, "two", folder), limit_s=600.0)
             lost = recorded_on(slurm, "two", folder)
