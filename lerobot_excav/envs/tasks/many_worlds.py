@@ -1,10 +1,10 @@
-"""Many worlds in one process: a vector environment whose worlds step at the same time, in threads.
+"""Many worlds in one process: a vector environment whose worlds may step at the same time, in threads.
 
-Soil kernels and MuJoCo let other threads run while they work, so that worlds share the cores of a machine without the
-processes, pipes and copies of `AsyncVectorEnv`. What a world does depends on its own seed and actions alone.
+Soil kernels and MuJoCo let other threads run while they work; Python between them does not, and today takes more than
+threads bring (`bench/many_worlds.py`), so that one thread is the default. What a world does depends on its own seed and
+actions alone.
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
@@ -30,7 +30,7 @@ class ManyWorlds(SyncVectorEnv):
     Args:
         num_envs: How many worlds.
         task: Id of the task.
-        threads: How many of them step at the same time; left out: one per core that this process may use.
+        threads: How many of them step at the same time.
         autoreset_mode: When a world that has ended begins its next episode, by Gymnasium's names: `NextStep`,
             `SameStep` (these resets pass one after another) or `Disabled`.
         settings: What each environment is made with: `obs_type`, `soil`, ...
@@ -44,11 +44,10 @@ class ManyWorlds(SyncVectorEnv):
         num_envs: int,
         *,
         task: str,
-        threads: int | None = None,
+        threads: int = 1,
         autoreset_mode: str = AutoresetMode.NEXT_STEP.value,
         **settings: Any,
     ) -> None:
-        threads = _usable_cores() if threads is None else threads
         require_integer("num_envs", num_envs, 1)
         require_integer("threads", threads, 1)
         require_choice("autoreset_mode", autoreset_mode, AUTORESET_MODES)
@@ -148,7 +147,3 @@ def _chosen(options: dict[str, Any] | None, worlds: int) -> list[int]:
     mask = options["reset_mask"]
     is_sound = isinstance(mask, np.ndarray) and mask.shape == (worlds,) and mask.dtype == np.bool_
     return np.flatnonzero(mask).tolist() if is_sound else []
-
-
-def _usable_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
