@@ -62,7 +62,11 @@ def cycles_behind(
 
 def late_ticks(folder: Path) -> str:
     """Return what the emulator says of the ticks of 20 ms that it could not make in time."""
-    lines = [line for line in (folder / "emulator.log").read_text().splitlines() if "ticks took longer" in line]
+    lines = [
+        line
+        for line in (folder / "emulator.log").read_text(encoding="utf-8").splitlines()
+        if "ticks took longer" in line
+    ]
     return lines[-1] if lines else "the emulator had to be killed, and says nothing of its ticks"
 
 
@@ -94,7 +98,7 @@ def _running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]
 
 def _wait_for_line(log: Path, words: str, process: subprocess.Popen[bytes]) -> None:
     deadline = time.monotonic() + PATIENCE_S
-    while words not in log.read_text():
+    while words not in log.read_text(encoding="utf-8"):
         if process.poll() is not None or time.monotonic() > deadline:
             raise RuntimeError(f"the emulator did not start; see {log}")
         time.sleep(0.2)
