@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from lerobot_excav.evaluation.statistics import wilson_interval
 from validation.finished_plays import read_finished
 from validation.page_operator.pad import STUBBED_PAD, Plan, planned
 from validation.page_operator.socket_page import ConsoleProcess, SocketPage
+from validation.rate_words import rate_words
 
 FILE = Path("results", "scoop", "page_operator.jsonl")
 SCENE_SET = "val"
@@ -109,9 +109,7 @@ def summary(cycles: Sequence[dict[str, Any]]) -> list[str]:
     """Return what came of the cycles, as lines."""
     lines = []
     for words, key in (("without the page", "is_success_without_page"), ("through the page", "is_success")):
-        successes, n = sum(cycle[key] for cycle in cycles), len(cycles)
-        interval = wilson_interval(successes, n)
-        lines.append(f"{words}: {successes} of {n}, {successes / n:.0%} [{interval.low:.0%}, {interval.high:.0%}]")
+        lines.append(f"{words}: {rate_words(sum(cycle[key] for cycle in cycles), len(cycles))}")
     lost = [(c["scene_id"], c["target_id"]) for c in cycles if c["is_success_without_page"] and not c["is_success"]]
     lines.append(f"lost through the page: {lost or 'none'}")
     return lines

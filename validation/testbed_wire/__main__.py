@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from lerobot_excav.evaluation.statistics import wilson_interval
 from validation.finished_plays import read_finished
+from validation.rate_words import rate_words
 from validation.testbed_wire.rollout import Wire, cycles_behind, late_ticks
 
 FILE = Path("results", "scoop", "testbed_wire.jsonl")
@@ -91,11 +91,9 @@ def table(conditions: Sequence[tuple[Wire, Sequence[dict[str, Any]]]]) -> list[s
     for wire, cycles in conditions:
         if not cycles:
             continue
-        n, rates = len(cycles), []
-        for name in ("is_success", "target_success"):
-            count = sum(bool(cycle[name]) for cycle in cycles)
-            interval = wilson_interval(count, n)
-            rates.append(f"{count} of {n}, {count / n:.0%} [{interval.low:.0%}, {interval.high:.0%}]")
+        n = len(cycles)
+        names = ("is_success", "target_success")
+        rates = [rate_words(sum(bool(cycle[name]) for cycle in cycles), n) for name in names]
         mass_kg = sum(cycle["retained_mass_kg"] for cycle in cycles) / n
         lines.append(f"| {wire.delay_ms} ms | {wire.loss:.0%} | {rates[0]} | {rates[1]} | {mass_kg:.0f} kg |")
     return lines

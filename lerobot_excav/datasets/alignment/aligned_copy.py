@@ -88,7 +88,7 @@ def _rows_of(dataset: LeRobotDataset, noted: NotedFrames, root: Path, log: Path)
     lengths = Counter(episodes)
     unlike = [index for index, length in lengths.items() if len(noted.get(index, ())) != length]
     # The last one may have been begun and thrown away.
-    beyond = [index for index in noted if index not in lengths and index > len(lengths)]
+    beyond = [index for index in noted if index > len(lengths)]
     if unlike or beyond:
         index = (unlike or beyond)[0]
         raise DatasetError(
