@@ -33,6 +33,8 @@ def has_stages(monkeypatch):
     entry = f"{__name__}:nearest_target"
     spec = dataclasses.replace(REACH, last_stage=9, nearest_target_entry=entry)
     monkeypatch.setitem(registry.TASKS, REACH.id, spec)
+    # An environment that another test left open plays the task without stages.
+    monkeypatch.setattr(simulation, "_open", [])
     LOOKED_FOR.clear()
 
 
