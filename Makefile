@@ -49,7 +49,7 @@ $(READY): pyproject.toml uv.lock
 	@$(RUN)/lerobot-excav warmup
 	@touch $@
 
-demo: $(READY) ## the trained policy clears a pile where it is pointed at; leaves a video, a map and a table (8 min)
+demo: $(READY) ## the trained policy clears a pile where it is pointed at; leaves a video, a map and a table (5 min)
 	@PATH="$(CURDIR)/$(RUN):$$PATH" bash examples/demo.sh $(DEMO)
 
 console: $(READY) ## a page in the browser: point, drive, let the policy dig there; make CONSOLE="--out=outputs/by_hand" console records

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.envs.tasks.shown_source import shown_source
 from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
 from lerobot_excav.testbed.protocol import RATE_HZ
 
@@ -50,12 +50,7 @@ class EmulatedSite:
         self._env = self._spec.make_env(
             obs_type="agent_pos", render_mode=None, **{**settings.as_dict(), "fps": RATE_HZ}
         )
-        self._source = CorruptedSource(
-            make_mask_source(settings.mask_source, options=settings.mask_options),
-            condition=settings.mask_condition,
-            noise=settings.mask_noise,
-            noise_px=settings.mask_noise_px,
-        )
+        self._source = shown_source(make_mask_source(settings.mask_source, options=settings.mask_options), settings)
         self._masked: Command | None = None
         self._mask: TargetMask | None = None
         self._black: NDArray[np.uint8] = np.zeros((*settings.observation_size, 3), np.uint8)

@@ -224,6 +224,7 @@ TASK = {
     "mask_condition": one_of("correct", "zero", "random", "mismatched"),
     "mask_noise": one_of("shift", "erode", "dilate", "flicker").beside(mask_noise_px=3),  # none has no size
     "mask_noise_px": whole(1, 1024).beside(mask_noise="shift"),
+    "mask_snap": flag,
     "target_overlay": flag,
 }
 SOIL = one_of("sand", "gravel", "dirt", "wet_sand")
@@ -243,6 +244,7 @@ ENV = {
     "render_mode": optional(one_of("rgb_array")),
     **dict.fromkeys(("render_height", "render_width"), whole(32, 1024)),
     "render_every": whole(1, 1000),
+    "camera_every": whole(1, 1000),
     "film_folder": optional(text),
     "film_every": whole(1, 1000).beside(film_folder="films"),
     **dict.fromkeys(("film_height", "film_width"), whole(32, 1024).beside(film_folder="films")),

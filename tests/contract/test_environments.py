@@ -17,8 +17,8 @@ FRAMES = 12
 # What reports read of every task.
 METRICS = (
     *("simulation_version", "task", "scene_set", "scene_id", "stage", "target_id", "is_success", "frames"),
-    *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "target_overlay", "shown_target_id"),
-    *("fps", "episode_length", "commands", "mask_missing", "mask_missing_frames", "mask_fallbacks"),
+    *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "mask_snap", "target_overlay", "shown_target_id"),
+    *("fps", "episode_length", "camera_every", "commands", "mask_missing", "mask_missing_frames", "mask_fallbacks"),
 )
 
 
@@ -140,6 +140,17 @@ def test_nothing_observed_is_constant_but_the_mask(trace, right):
             assert (np.ptp(seen, axis=0) > 0.0).all(), key
 
 
+def test_held_pictures_are_those_of_every_third_frame_and_all_else_goes_on(gym_id, trace):
+    env = made(gym_id, camera_every=3)
+    held = [observation for observation, _ in play(env)]
+    env.close()
+    for number, observation in enumerate(held):
+        drawn = trace[number - number % 3][0]
+        for key, array in observation.items():
+            expected = drawn if key.startswith("pixels/") else trace[number][0]
+            assert np.array_equal(array, expected[key]), (number, key)
+
+
 def test_the_mask_is_black_and_white_and_shows_something(right):
     mask = right["pixels/target_mask"]
     assert set(np.unique(mask)) == {0, 255}
@@ -183,7 +194,9 @@ def test_a_mask_that_flickers_lies_elsewhere_at_every_frame_and_is_the_same_agai
         ({"mask_noise": "shift"}, "mask_noise"),
         ({"mask_noise_px": 2}, "mask_noise"),
         ({"mask_noise": "shift", "mask_noise_px": 2, "mask_condition": "zero"}, "mask_noise"),
+        ({"mask_snap": True, "mask_condition": "zero"}, "mask_snap"),
         ({"episode_length": 0}, "episode_length=0"),
+        ({"camera_every": 0}, "camera_every=0"),
     ],
 )
 def test_impossible_settings_are_refused(gym_id, settings, named):

@@ -38,10 +38,12 @@ def assert_passes(root, episodes):
     assert len(report.episodes) == episodes
 
 
+@pytest.mark.slow
 def test_the_words_of_the_task_are_changed(edit):
     assert_passes(edit("modify_tasks", "new_task=dig", into="data"), 8)
 
 
+@pytest.mark.slow
 def test_statistics_are_computed_again(edit):
     assert_passes(edit("recompute_stats", "skip_image_video=false", "overwrite=true", into="data"), 8)
 
@@ -51,6 +53,7 @@ def test_a_dataset_is_described(edit, capsys):
     assert "8" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_without_a_camera_of_the_task_it_is_another_dataset(edit):
     root = edit("remove_feature", f"feature_names=['{MAIN}']")
     assert any(MAIN in problem for problem in check_dataset(root, replays=0).problems)
@@ -69,6 +72,7 @@ def test_lerobots_own_settings_for_videos_are_refused_afterwards(edit):
     assert any("blurs the mask" in problem for problem in report.problems)
 
 
+@pytest.mark.slow
 def test_videos_are_encoded_again_with_lossless_settings_only(edit):
     settings = [f"rgb_encoder.{each}" for each in LOSSLESS]
     assert_passes(edit("reencode_videos", *settings, storage="video"), 8)

@@ -31,7 +31,7 @@ def test_the_operator_plays_test_scenes_unless_told_otherwise(tmp_path, capsys, 
     assert column in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("option", ["mask_condition=zero", "target_overlay=true"])
+@pytest.mark.parametrize("option", ["mask_condition=zero", "mask_snap=true", "target_overlay=true"])
 def test_options_of_the_mask_are_refused_as_they_have_no_effect(option, tmp_path, capsys):
     assert main(["operator", "--env.type=toy_reach", f"--env.{option}", f"--metrics={tmp_path / 'm'}"]) == 2
     assert f"--env.{option.partition('=')[0]}=" in capsys.readouterr().err

@@ -30,6 +30,7 @@ def test_a_failed_episode_ends_with_1_and_is_tabled(dataset, another_simulation,
     assert "2 of 2 episodes failed" in text
 
 
+@pytest.mark.slow
 def test_the_seed_chooses_the_replays(dataset, another_simulation):
     replayed = set()
     for seed in range(4):

@@ -22,7 +22,7 @@ from lerobot_excav.datasets.format.schema import (
     camera_key,
 )
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
-from lerobot_excav.envs.tasks.settings import LAST_SCENE, SCENE_SETS
+from lerobot_excav.envs.tasks.settings import LAST_SCENE, SCENE_SETS, SNAPPED
 from lerobot_excav.errors import ConfigurationError, DatasetError
 
 MAIN_KEY = camera_key("main")
@@ -41,7 +41,8 @@ MOST_REST_FRAMES = 100_000
 """As many as a demonstration may have at all."""
 
 MASK_WORDS = re.compile(
-    rf"[^,]+(, ({'|'.join(MASK_CONDITIONS[1:])}))?(, ({'|'.join(MASK_NOISES[1:])}) [1-9][0-9]* px)?(, {OVERLAY})?"
+    rf"[^,]+(, ({'|'.join(MASK_CONDITIONS[1:])}))?(, ({'|'.join(MASK_NOISES[1:])}) [1-9][0-9]* px)?"
+    rf"(, {SNAPPED})?(, {OVERLAY})?"
 )
 """What `TaskSettings.mask_words` can be; a source may be of a package that is not installed here."""
 

@@ -10,7 +10,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
 from lerobot_excav.envs.holder import holder_of
-from lerobot_excav.envs.tasks.masked_env import RENDER_MODES
+from lerobot_excav.envs.tasks.masked_env import MOST_HELD_FRAMES, RENDER_MODES
 from lerobot_excav.envs.tasks.registry import task_of_settings, task_settings
 from lerobot_excav.envs.tasks.settings import RenderSettings, TaskSettings
 from lerobot_excav.envs.tasks.task import TaskSpec
@@ -47,6 +47,14 @@ class MaskedTaskEnvConfig(RenderSettings, EnvConfig):  # type: ignore[misc]  # L
     )
     render_mode: str | None = setting(
         "rgb_array, from which LeRobot makes videos, or null", default="rgb_array", choices=RENDER_MODES
+    )
+    camera_every: int = setting(
+        "Draw what the policy sees every n-th frame, and when the mask changes, and show it until then. With the same "
+        "--policy.n_action_steps the results are the same, for mask_act looks at no other pictures, and evaluation is "
+        "faster",
+        default=1,
+        low=1,
+        high=MOST_HELD_FRAMES,
     )
     # LeRobot's own fields, explained.
     features: dict[str, PolicyFeature] = field(
@@ -94,7 +102,7 @@ class MaskedTaskEnvConfig(RenderSettings, EnvConfig):  # type: ignore[misc]  # L
         """Arguments of `gymnasium.make` besides the id."""
         settings = task_settings(cast(TaskSettings, self))
         shown = {name: getattr(self, name) for name in declared_settings(RenderSettings)}
-        return {**settings.as_dict(), **shown, "render_mode": self.render_mode}
+        return {**settings.as_dict(), **shown, "render_mode": self.render_mode, "camera_every": self.camera_every}
 
     @override
     def create_envs(

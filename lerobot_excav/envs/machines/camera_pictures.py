@@ -58,10 +58,20 @@ class CameraPictures:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
 
-    def colour(self, camera: str, options: Any) -> NDArray[np.uint8]:
-        """Return a colour picture (H, W, 3), uint8."""
-        with self._drawn(camera, options) as mjr:
-            return self._read_colour(mjr)
+    def colour(self, camera: str, options: Any, *, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """Return a colour picture (H, W, 3), uint8; or one of a smaller `size` (h, w), which costs less.
+
+        Raises:
+            ConfigurationError: `size` is larger than the pictures of this renderer, or not positive.
+        """
+        height, width = size or (self._height, self._width)
+        require(
+            0 < height <= self._height and 0 < width <= self._width,
+            f"size={size} is not possible; give a height from 1 to {self._height} and a width from 1 to {self._width}",
+        )
+        viewport = mujoco.MjrRect(0, 0, width, height)
+        with self._drawn(camera, options, viewport=viewport) as mjr:
+            return self._read_colour(mjr, viewport)
 
     def distance_m(self, camera: str, options: Any) -> NDArray[np.float64]:
         """Return the distance along the optical axis (H, W) [m]; the far plane where nothing is."""
@@ -92,7 +102,7 @@ class CameraPictures:
     def geoms(self, camera: str, options: Any) -> NDArray[np.int64]:
         """Return the index in the model of the geom that every pixel shows (H, W); -1 where none is."""
         with self._drawn(camera, options, numbers=True) as mjr:
-            picture = self._read_colour(mjr)
+            picture = self._read_colour(mjr, self._viewport)
         # Colour n + 1 is the n-th drawn object, 0 the background.
         number = picture @ np.array([1, 1 << 8, 1 << 16]) - 1
         shown = np.full((self._height, self._width), -1)
@@ -132,7 +142,7 @@ class CameraPictures:
         return self._context
 
     @contextmanager
-    def _drawn(self, camera: str, options: Any, *, numbers: bool = False) -> Iterator[Any]:
+    def _drawn(self, camera: str, options: Any, *, numbers: bool = False, viewport: Any = None) -> Iterator[Any]:
         """Draw things in their colours or as their numbers; give the `MjrContext` that holds the picture."""
         require_choice("camera", camera, self._cameras)
         with self._opened().bound() as mjr:
@@ -142,12 +152,13 @@ class CameraPictures:
             mujoco.mjv_updateScene(
                 self._model, self._data, options, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
             )
-            mujoco.mjr_render(self._viewport, self._scene, mjr)
+            mujoco.mjr_render(viewport or self._viewport, self._scene, mjr)
             yield mjr
 
-    def _read_colour(self, mjr: Any) -> NDArray[np.uint8]:
-        image = np.empty((self._height, self._width, 3), np.uint8)
-        mujoco.mjr_readPixels(image, None, self._viewport, mjr)
+    @staticmethod
+    def _read_colour(mjr: Any, viewport: Any) -> NDArray[np.uint8]:
+        image = np.empty((viewport.height, viewport.width, 3), np.uint8)
+        mujoco.mjr_readPixels(image, None, viewport, mjr)
         return image[::-1].copy()
 
 

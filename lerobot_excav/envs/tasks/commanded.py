@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.geometry import GeometrySource
 from lerobot_excav.envs.masks.pointed import PointedSource
 from lerobot_excav.envs.masks.shot import ENLARGED, Shot
-from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, Pixels, TargetMask, chooses_target
+from lerobot_excav.envs.masks.source import MaskMissingError, Pixels, TargetMask, chooses_target
 from lerobot_excav.envs.tasks.retarget import second_target
 from lerobot_excav.envs.tasks.selection import Selection
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
+from lerobot_excav.envs.tasks.shown_source import ShownSource, shown_source
 from lerobot_excav.envs.tasks.task import TaskSpec
 from lerobot_excav.envs.tasks.watched import WatchedEnv
 from lerobot_excav.errors import ConfigurationError, require, require_integer
@@ -40,8 +40,8 @@ class CommandedEnv(WatchedEnv):
     _selection: Selection | None
     _commands: list[Command]
     _mask: TargetMask | None
-    _named_source: CorruptedSource  # the one that the settings name
-    _source: CorruptedSource  # of the present command
+    _named_source: ShownSource  # the one that the settings name
+    _source: ShownSource  # of the present command
     _frame: int
     _missing_frames: int
     _mask_fallbacks: int  # how often a source that chooses has left the choice to the planner
@@ -229,7 +229,7 @@ class CommandedEnv(WatchedEnv):
         """Whether nothing was found for the command, so that no action is carried out."""
         return self._shows_pixels and self._mask is None
 
-    def _give_command(self, target_id: int, source: CorruptedSource | None = None) -> None:
+    def _give_command(self, target_id: int, source: ShownSource | None = None) -> None:
         """Command a target, shown by the source that the settings name unless by another."""
         command = Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame)
         self._commands.append(command)
@@ -326,9 +326,9 @@ class CommandedEnv(WatchedEnv):
         covered_w = self.places_w()[pixels]
         covered_w = covered_w[np.isfinite(covered_w).all(axis=-1)]
         require(len(covered_w) > 0, "the mask covers nothing to act on; mark soil, or a block")
-        return self._point(self._target_at(covered_w.mean(axis=0)), self._corrupted(PointedSource(pixels)))
+        return self._point(self._target_at(covered_w.mean(axis=0)), shown_source(PointedSource(pixels), self.settings))
 
-    def _point(self, target_id: int, source: CorruptedSource) -> Seen:
+    def _point(self, target_id: int, source: ShownSource) -> Seen:
         """Command a target by a source's mask; without one, everything stays as it was."""
         commands, mask = list(self._commands), None
         self._commands.append(Command(target_id=target_id, region=self._region(target_id), since_frame=self._frame))
@@ -346,17 +346,10 @@ class CommandedEnv(WatchedEnv):
         return self._observe(), self._info(is_over=False)
 
     @property
-    def _pointing_source(self) -> CorruptedSource:
+    def _pointing_source(self) -> ShownSource:
         """What shows a target that a person commands: the source of the settings, unless that one chooses itself."""
         chooses = chooses_target(self.settings.mask_source)
-        return self._corrupted(GeometrySource()) if chooses else self._named_source
-
-    def _corrupted(self, source: MaskSource) -> CorruptedSource:
-        """Return a source under the condition and with the noise of the settings."""
-        settings = self.settings
-        return CorruptedSource(
-            source, condition=settings.mask_condition, noise=settings.mask_noise, noise_px=settings.mask_noise_px
-        )
+        return shown_source(GeometrySource(), self.settings) if chooses else self._named_source
 
     def _require_running(self) -> None:
         self._require_episode()

@@ -15,13 +15,18 @@ from lerobot_excav.envs.masks.options import options_words
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.commanded import CommandedEnv
+from lerobot_excav.envs.tasks.held_pictures import HeldPictures
 from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import RenderSettings
-from lerobot_excav.errors import require_choice
+from lerobot_excav.envs.tasks.shown_source import shown_source
+from lerobot_excav.errors import require_choice, require_integer
 from lerobot_excav.setting import declared_settings
 
 RENDER_MODES = ("rgb_array", None)
+
+MOST_HELD_FRAMES = 1000
+"""Frames for which the same pictures can be shown at most."""
 
 NO_TARGET = -1
 """What stands for none of the targets where an index is expected."""
@@ -46,6 +51,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         obs_type: One of `task.OBS_TYPES`.
         render_mode: `rgb_array` or None.
         depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
+        camera_every: Draw what policies see every n-th frame, and when the mask changes, and hold it until then.
         settings: Fields of the task's `TaskSettings` and of `RenderSettings`, by name.
 
     Raises:
@@ -63,6 +69,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         obs_type: str = "pixels_agent_pos",
         render_mode: str | None = "rgb_array",
         depth_info: bool = False,
+        camera_every: int = 1,
         **settings: Any,
     ) -> None:
         self.task_spec = spec = task_played_by(type(self), self.TASK, task)
@@ -82,9 +89,11 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self.action_space = gym.spaces.Box(
             np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
         )
+        require_integer("camera_every", camera_every, 1, MOST_HELD_FRAMES)
+        self._held = HeldPictures(camera_every)
         self._ticks_per_frame = TICKS_PER_SECOND // self.fps
-        self._source = self._named_source = self._corrupted(
-            make_mask_source(self.settings.mask_source, options=self.settings.mask_options)
+        self._source = self._named_source = shown_source(
+            make_mask_source(self.settings.mask_source, options=self.settings.mask_options), self.settings
         )
         options = self.settings.mask_options
         self._options_words = None if options is None else options_words(Path(options))
@@ -178,6 +187,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._selection = selection
         self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._commands, self._main_img, self._is_over = [], None, False
+        self._held.forget()
         try:
             self._give_command(selection.target_id)
             self._wait_for_mask()
@@ -221,9 +231,14 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
 
     def _observe(self) -> dict[str, Any]:
         state = {"environment_state": self.environment_state} if self.obs_type == "state" else {}
-        cameras = self.task_spec.cameras if self._shows_pixels else ()
-        pixels = {camera: self._draw(camera) for camera in cameras}
-        return {"agent_pos": self.agent_pos, **state, **({"pixels": pixels} if pixels else {})}
+        if not self._shows_pixels:
+            return {"agent_pos": self.agent_pos, **state}
+        mask = None if self.mask is None else self.mask.pixels
+        pixels = self._held.shown(self._frame + self._missing_frames, mask, self._draw_all)
+        return {"agent_pos": self.agent_pos, **state, "pixels": pixels}
+
+    def _draw_all(self) -> dict[str, NDArray[np.uint8]]:
+        return {camera: self._draw(camera) for camera in self.task_spec.cameras}
 
     def _draw(self, camera: str) -> NDArray[np.uint8]:
         if camera == "target_mask":
@@ -256,6 +271,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             **{name: value for name, value in self.settings.as_dict().items() if value is not None},
             **({} if self._options_words is None else {"mask_options": self._options_words}),
             "episode_length": self.episode_length,
+            "camera_every": self._held.every,
             "scene_id": self.scene_id,
             "stage": self.stage,
             "target_id": self._commands[0].target_id,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt, model_validator
 
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
-from lerobot_excav.envs.tasks.settings import FRAME_RATES, LAST_SCENE, SCENE_SETS, TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.settings import FRAME_RATES, LAST_SCENE, SCENE_SETS, SNAPPED, TARGETS_PER_SCENE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +20,7 @@ MASK_SETTINGS = {
     "mask_condition": "mask conditions",
     "mask_noise": "kinds of mask noise",
     "mask_noise_px": "strengths of mask noise",
+    "mask_snap": "snapped masks and others",
 }
 """What says which mask was shown, with its plural for messages; every environment takes these as settings, and tells of
 its options the name of the file and a digest."""
@@ -71,6 +72,7 @@ class EpisodeRecord(BaseModel):
     task: str
     fps: Annotated[int, one_of(FRAME_RATES)]
     episode_length: PositiveInt
+    camera_every: PositiveInt = 1  # files of earlier releases do not say it
     scene_set: Annotated[str, one_of(SCENE_SETS)]
     scene_id: int = Field(ge=0, le=LAST_SCENE)
     stage: int = Field(default=0, ge=0)  # cycles dug before the start; files of earlier releases hold stage 0 only
@@ -80,6 +82,7 @@ class EpisodeRecord(BaseModel):
     mask_condition: Annotated[str, one_of(MASK_CONDITIONS)]
     mask_noise: Annotated[str, one_of(MASK_NOISES)]
     mask_noise_px: NonNegativeInt
+    mask_snap: bool = False  # files of earlier releases do not say it, for nothing was snapped
     target_overlay: bool
     shown_target_id: int = Field(ge=-1, lt=TARGETS_PER_SCENE)  # of the last mask, noise aside; -1 if it showed none
     is_success: bool  # every part of the task succeeded
@@ -122,6 +125,8 @@ class EpisodeRecord(BaseModel):
             words.append(f"from {self.mask_source}")
         if self.mask_noise != "none":
             words.append(f"{self.mask_noise} {self.mask_noise_px} px")
+        if self.mask_snap:
+            words.append(SNAPPED)
         if self.target_overlay:
             words.append("as overlay")
         return ", ".join(words)
@@ -217,7 +222,7 @@ class TaskMeasures:
         """All that the episodes of a run share, with the plural for messages."""
         version = {"simulation_version": "versions of the simulation"}
         overlay = {"target_overlay": "pictures with and without overlay"}
-        time = {"fps": "frame rates", "episode_length": "time limits"}
+        time = {"fps": "frame rates", "episode_length": "time limits", "camera_every": "camera rates"}
         return {**MASK_SETTINGS, **overlay, **time, **self.settings, **self.shared, **version}
 
     def column(self, key: str) -> Column:

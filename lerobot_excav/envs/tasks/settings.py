@@ -16,6 +16,8 @@ TARGETS_PER_SCENE = 4
 LAST_SCENE = 2**31 - 1  # of every scene set; datasets hold a scene's number as int64
 ENDLESS_FRAMES = 2**31 - 1  # length of an episode that the command, not the environment, ends
 FRAME_RATES = tuple(n for n in range(1, TICKS_PER_SECOND + 1) if TICKS_PER_SECOND % n == 0)
+SNAPPED = "snapped"
+"""How datasets and reports say that masks were snapped onto what lies under them."""
 _LEAST_IMAGE_PX, _MOST_IMAGE_PX = 32, 1024  # below, a target covers hardly a pixel
 
 
@@ -129,6 +131,11 @@ class TaskSettings:
     mask_condition: str = setting("What the target mask shows", default="correct", choices=MASK_CONDITIONS)
     mask_noise: str = setting("Error that is added to the mask", default="none", choices=MASK_NOISES)
     mask_noise_px: int = setting("Size of that error [px]", default=0, low=0, high=_MOST_IMAGE_PX)
+    mask_snap: bool = setting(
+        "Whether a small network that looks at the picture marks what lies under the middle of the mask, and that is "
+        "shown in its place: mends masks that lie beside their object",
+        default=False,
+    )
     target_overlay: bool = setting(
         "Whether the mask as shown is tinted into the main picture, for policies without a mask input",
         default=False,
@@ -158,6 +165,11 @@ class TaskSettings:
             f"{prefix}mask_noise={noise!r} has no effect with {prefix}mask_condition='zero', which shows no "
             "mask; leave one of them out",
         )
+        require(
+            self.mask_condition != "zero" or not self.mask_snap,
+            f"{prefix}mask_snap=True has no effect with {prefix}mask_condition='zero', which shows no mask; leave one "
+            "of them out",
+        )
 
     @property
     def observation_size(self) -> tuple[int, int]:
@@ -179,8 +191,9 @@ class TaskSettings:
     @property
     def mask_words(self) -> str:
         """What the mask shows, in words; datasets keep it as `excav.mask_source`."""
-        words = (self.mask_source, *self._mask_errors, *(("as overlay",) if self.target_overlay else ()))
-        return ", ".join(words)
+        snapped = (SNAPPED,) if self.mask_snap else ()
+        overlay = ("as overlay",) if self.target_overlay else ()
+        return ", ".join((self.mask_source, *self._mask_errors, *snapped, *overlay))
 
     def require_mask_effect(self, obs_type: str) -> None:
         """Refuse settings of the mask where the target is told as numbers, exactly.
@@ -189,7 +202,7 @@ class TaskSettings:
             ConfigurationError: `obs_type` is `state`, and one is not its default.
         """
         names = (
-            ("mask_source", "mask_options", "mask_condition", "mask_noise", "target_overlay")
+            ("mask_source", "mask_options", "mask_condition", "mask_noise", "mask_snap", "target_overlay")
             if obs_type == "state"
             else ()
         )

@@ -60,6 +60,7 @@ def test_every_frame_says_how_old_what_it_saw_was(recording, tmp_path):
     assert np.flatnonzero(~column(tmp_path / "out", "excav.is_as_told")).tolist() == [2]
 
 
+@pytest.mark.slow
 def test_all_else_stays_as_it_is(recording, tmp_path):
     write_aligned_copy(recording, tmp_path / "out", log=write_log(tmp_path / "log.jsonl", lengths_of(recording)))
     for ours, theirs in zip(load(tmp_path / "out"), load(recording), strict=True):
@@ -73,6 +74,7 @@ def told(capsys, *arguments):
     return code, capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_command_counts_and_its_exit_code_tells(recording, tmp_path, capsys):
     lengths = lengths_of(recording)
     sound = write_log(tmp_path / "sound.jsonl", lengths)
@@ -95,6 +97,7 @@ def test_the_command_counts_and_its_exit_code_tells(recording, tmp_path, capsys)
     assert "oldest picture of unknown age" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
@@ -125,6 +128,7 @@ def frame_line(episode, frame):
     })  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_episode_that_was_recorded_again_and_is_shorter_counts_as_it_was_the_last_time(recording, tmp_path):
     lengths = lengths_of(recording)
     path = write_log(tmp_path / "log.jsonl", [lengths[0] + 5, lengths[1]])
@@ -133,12 +137,14 @@ def test_an_episode_that_was_recorded_again_and_is_shorter_counts_as_it_was_the_
     assert write_aligned_copy(recording, tmp_path / "out", log=path).late_frames == 1
 
 
+@pytest.mark.slow
 def test_an_episode_that_was_begun_and_thrown_away_at_the_end_is_no_fault(recording, tmp_path):
     path = write_log(tmp_path / "log.jsonl", lengths_of(recording))
     path.write_text(path.read_text() + frame_line(2, 0) + "\n")
     assert write_aligned_copy(recording, tmp_path / "out", log=path).late_frames == 0
 
 
+@pytest.mark.slow
 def test_a_line_that_a_crash_cut_off_is_passed_over(recording, tmp_path):
     path = write_log(tmp_path / "log.jsonl", lengths_of(recording))
     path.write_text(path.read_text() + '{"episode_index": 1, "fra')

@@ -53,6 +53,7 @@ def test_what_lerobot_alone_objects_to_is_told(copy, capsys):
     assert SEEN_BY_LEROBOT_ALONE.told in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_is_harmless_is_passed(copy, capsys, name):
     root = copy()

@@ -38,6 +38,7 @@ def drawn(tmp_path, *keys):
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", STORAGES)
 def test_the_source_of_the_recording_makes_its_masks_again_where_commands_change_too(
     changing_datasets, tmp_path, storage

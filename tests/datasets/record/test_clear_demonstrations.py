@@ -34,6 +34,7 @@ def folder(tmp_path_factory):
         yield folder
 
 
+@pytest.mark.slow
 def test_a_dataset_of_clearing_is_read_as_such_and_its_commands_are_seen_though_their_number_stays(folder):
     keys = (TASK_KEY, COMMAND_KEY, TARGET_KEY, PAIR_KEY, SCENE_KEY)
     (episode,) = iterate_episodes(folder / "Clear-v0", keys)

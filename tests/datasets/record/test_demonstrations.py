@@ -50,6 +50,7 @@ def test_frames_read_back_as_they_were_played(request, paired_dataset, changing_
         assert item["task"] == "Slide to the spot that the mask marks."
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, monkeypatch, command_changes):
     record_toy(tmp_path / "whole")
     played = []
@@ -72,6 +73,7 @@ def test_an_interrupted_run_continues_to_the_same_bytes(tmp_path, monkeypatch, c
     assert not (tmp_path / "broken.partial").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", ["episode", "outcome", "assembly", "index"])
 def test_after_a_full_disk_a_run_continues_and_nothing_that_was_finished_is_played_again(tmp_path, monkeypatch, stage):
     record_toy(tmp_path / "whole", scenes=1)
@@ -183,6 +185,7 @@ def test_an_impossible_number_of_workers_leaves_no_folder(tmp_path, workers):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_every_episode_has_its_own_seed_whatever_is_recorded_with_it(tmp_path, paired_dataset):
     among = load(paired_dataset, [10])[0]
     for name, changes in (("alone", {}), ("otherwise", {"seed": 1})):

@@ -104,6 +104,7 @@ def test_several_environments_count_the_same_also_in_processes_of_their_own(run,
     assert run(n_envs, use_async=use_async) == run(1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["Scoop-v0", "FR5Grasp-v0"])
 def test_a_task_gives_the_same_alone_and_beside_others(tmp_path, task):
     spec, results = TASKS[task], []

@@ -95,6 +95,7 @@ def test_failure_names_every_backend_and_says_what_to_install(monkeypatch, pictu
         draw(pictures)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variable", ["DISPLAY", "WAYLAND_DISPLAY"])
 def test_without_a_server_for_the_display_egl_draws(variable):
     assert run("print(draw(pictures()))", **{variable: ":77"}) == "0\n"

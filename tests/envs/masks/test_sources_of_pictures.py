@@ -180,6 +180,7 @@ def test_settings_of_masks_go_into_files(tmp_path):
     assert json.loads(json.dumps(env.settings.as_dict()))["mask_options"] == settings["mask_options"]
 
 
+@pytest.mark.slow
 def test_a_scene_that_was_dug_looks_as_at_first_when_it_is_shown_again():
     env = ExcavatorEnv(fidelity="fast", render_mode=None, scene_set="val", mask_source="geometry")
     env.reset(options=START)
@@ -216,6 +217,7 @@ def test_a_click_that_hits_nothing_is_an_error(make, tmp_path):
         make(**options(tmp_path, '[[mask]]\nkey = "*"\nclick = [0.5, 0.01]\n'))
 
 
+@pytest.mark.slow
 def test_every_cycle_of_clearing_has_a_key_of_its_own(tmp_path):
     polygons = {0: "[[0, 0], [0.5, 0], [0.5, 0.5]]", 1: "[[0.5, 0.5], [1, 0.5], [1, 1]]"}
     text = "".join(f'[[mask]]\nkey = "val/3/0/0/{cycle}"\npolygon = {shape}\n' for cycle, shape in polygons.items())

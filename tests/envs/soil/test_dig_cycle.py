@@ -114,6 +114,7 @@ def test_a_full_bucket_takes_no_more_and_pushes_a_heap_before_it():
     assert soil.heights_m[i, 60] > 0.85
 
 
+@pytest.mark.slow
 def test_the_benchmark_reports_a_plausible_cycle():
     report = real_time_factor(seed=1)
     assert 0.0 < report["p50_ms"] <= report["p95_ms"] <= report["worst_ms"]

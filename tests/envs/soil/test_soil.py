@@ -70,6 +70,7 @@ def test_soil_for_a_box_that_is_not_there_is_refused():
         Soil().reset(container_heights_m=np.zeros((1, 1)))
 
 
+@pytest.mark.slow
 def test_the_same_seed_and_motion_give_the_same_bits_also_after_a_reset():
     """Over the whole cycle: dig, carry asleep, dump, land in the box."""
     runs = []
@@ -126,6 +127,7 @@ def test_swell_leaves_less_mass_in_a_full_bucket():
     assert full[1] == pytest.approx(full[0] / 1.2, rel=0.06)
 
 
+@pytest.mark.slow
 def test_fidelities_differ_but_agree_on_the_load():
     carrying = [dug(400, fidelity=fidelity) for fidelity in FIDELITIES]
     assert len({soil.heights_m.tobytes() for soil in carrying}) == len(FIDELITIES)

@@ -95,6 +95,17 @@ def test_an_episode_without_a_mask_is_given_up_and_no_action_is_carried_out():
     assert metrics["shown_target_id"] == -1
 
 
+def test_held_pictures_are_drawn_again_with_a_new_command_and_in_a_new_episode():
+    still = np.zeros(2, np.float32)
+    env = ReachEnv(camera_every=50)
+    first, _ = env.reset(seed=2, options={"commands": [(4, 3)]})
+    pixels = [first["pixels"], *(env.step(still)[0]["pixels"] for _ in range(6))]
+    masks = [each["target_mask"].tobytes() for each in pixels]
+    assert len(set(masks[:4])) == len(set(masks[4:])) == 1
+    assert masks[3] != masks[4]
+    assert np.array_equal(env.reset(seed=3)[0]["pixels"]["main"], ReachEnv().reset(seed=3)[0]["pixels"]["main"])
+
+
 @pytest.mark.parametrize("condition", ["correct", "mismatched", "zero"])
 def test_an_overlay_tints_the_mask_as_shown_into_the_main_view_alone(condition):
     def start(**settings):

@@ -20,6 +20,7 @@ def scoop(rate_hz, delay_ms, scene_id, *, is_success=True, kg=400.0):
     }
 
 
+@pytest.mark.slow
 def test_without_a_delay_at_the_frame_rate_of_the_environment_the_scoop_is_the_environments():
     env = SCOOP.make_env(scene_set="val", obs_type="agent_pos", render_mode=None)
     env.reset(options={"scene_id": 1, "target_id": 1})

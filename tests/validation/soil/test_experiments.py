@@ -11,6 +11,7 @@ QUICK = Conditions(quick=True, seeds=(0,))
 CHEAP = ("blade_force", "earthmoving_factors", "free_fall", "ledger", "force_ramp", "ridge", "stall")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", [pytest.param(e, id=e.name) for e in EXPERIMENTS if e.name in CHEAP])
 def test_an_experiment_is_inside_its_gates_or_says_why_not(experiment):
     result = experiment.run(QUICK)

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 # All tuned by eye.
 _SHARE = 0.36
@@ -10,13 +9,15 @@ _FRAME_SHARE = 0.006
 _FRAME_RGB = (240, 240, 235)
 
 
+def inset_size(height: int, width: int) -> tuple[int, int]:
+    """Return height and width of the small picture in one of a height and a width [px]."""
+    return max(1, round(_SHARE * height)), max(1, round(_SHARE * width))
+
+
 def with_inset(picture: NDArray[np.uint8], small: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a picture (H, W, 3) with a second one, made smaller and framed, in its upper left corner."""
-    height, width = picture.shape[:2]
-    frame = max(1, round(_FRAME_SHARE * height))
-    size = (max(1, round(_SHARE * width)), max(1, round(_SHARE * height)))
-    inset = np.asarray(Image.fromarray(small).resize(size, Image.Resampling.BOX))
+    """Return a picture (H, W, 3) with a second one, of `inset_size`, framed in its upper left corner."""
+    frame, (height, width) = max(1, round(_FRAME_SHARE * picture.shape[0])), small.shape[:2]
     result = picture.copy()
-    result[: size[1] + 2 * frame, : size[0] + 2 * frame] = _FRAME_RGB
-    result[frame : frame + size[1], frame : frame + size[0]] = inset
+    result[: height + 2 * frame, : width + 2 * frame] = _FRAME_RGB
+    result[frame : frame + height, frame : frame + width] = small
     return result

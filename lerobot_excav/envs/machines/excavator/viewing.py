@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.camera_pictures import CameraPictures, visible_groups
 from lerobot_excav.envs.machines.excavator.bodywork import LOOSE_SOIL_GROUP, MACHINE_GROUP, SURROUNDINGS_GROUP
 from lerobot_excav.envs.machines.excavator.features import OVERVIEW_WITH_SIDE, VIEW_CAMERAS
-from lerobot_excav.envs.machines.excavator.inset import with_inset
+from lerobot_excav.envs.machines.excavator.inset import inset_size, with_inset
 from lerobot_excav.envs.machines.excavator.scenery import (
     CLEAR_WALL,
     PLUMB_LINE,
@@ -42,7 +42,7 @@ class WorksiteView:
     """
 
     def __init__(self, worksite: Worksite, *, height: int, width: int) -> None:
-        self._worksite = worksite
+        self._worksite, self._inset_size = worksite, inset_size(height, width)
         self._model = build_scenery(worksite.machine.container)
         self._data = mujoco.MjData(self._model)
         self._soil_picture = SoilPicture(self._model, worksite.machine, terrain_spacing_m=TERRAIN_SPACING_M)
@@ -72,7 +72,8 @@ class WorksiteView:
         mujoco.mj_fwdPosition(self._model, self._data)
         self._soil_picture.update(self._worksite.soil, self._worksite.start_heights_m)
         if camera == OVERVIEW_WITH_SIDE:
-            return with_inset(*(self._pictures.colour(name, self._all) for name in ("overview", "side")))
+            side = self._pictures.colour("side", self._all, size=self._inset_size)
+            return with_inset(self._pictures.colour("overview", self._all), side)
         return self._pictures.colour(camera, self._all)
 
     def close(self) -> None:

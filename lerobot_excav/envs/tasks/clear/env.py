@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.tasks.clear.clearing import Clearing
 from lerobot_excav.envs.tasks.clear.spec import CYCLES, LEAST_REMOVED
 from lerobot_excav.envs.tasks.commanded import Seen
@@ -21,6 +20,7 @@ from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.env import FULL_BUCKET_KG, ExcavatorEnv
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.selection import Selection, TargetAbsentError
+from lerobot_excav.envs.tasks.shown_source import ShownSource
 from lerobot_excav.errors import ConfigurationError, require
 
 PLANNER_PICTURE_PX = (192, 256)
@@ -176,7 +176,7 @@ class ClearEnv(ExcavatorEnv):
         return rate(places_w, surface, self._excavator_settings.zones, self._clearing.vain_w)
 
     @override
-    def _point(self, target_id: int, source: CorruptedSource) -> Seen:
+    def _point(self, target_id: int, source: ShownSource) -> Seen:
         """Command a target, whose cycle has its whole time from now on: a person may have thought for long."""
         seen = super()._point(target_id, source)
         self._clearing.begin_time_again()

@@ -200,6 +200,7 @@ def test_a_bucket_at_rest_in_soil_stays(machine):
     assert np.abs(machine.joint_vel).max() < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pitch", [-1.7, -1.95, -2.2])
 def test_a_bucket_that_stalls_in_deep_soil_holds_still_without_chatter(machine, pitch):
     """The machine pulls as hard as it can; the soil holds it."""

@@ -176,6 +176,7 @@ def crosses(polygon, start, end):
     return bool((turns > 0).all() or (turns < 0).all())
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=12)
 def test_no_parcel_passes_a_plate_at_the_largest_speed(seed):

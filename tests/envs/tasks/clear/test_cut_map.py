@@ -1,6 +1,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from PIL import Image
 
 from lerobot_excav.envs.tasks.clear.cut_map import MOST_PILES, draw_cut_map
@@ -15,6 +16,7 @@ def piles(count):
     return [ClearRecord.model_validate_json(json.dumps(json.loads(line))) for line in lines]
 
 
+@pytest.mark.slow
 def test_every_pile_gets_a_panel_up_to_a_number(tmp_path):
     widths = []
     for count in (1, 2, 6):
@@ -51,6 +53,7 @@ def test_a_report_of_piles_says_the_sentence_and_draws_the_map(tmp_path, capsys)
     assert "![a b](figure_a_b.png)" in (tmp_path / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_figures_of_one_name_are_kept_apart_and_old_ones_go(tmp_path):
     other = tmp_path / "other.jsonl"
     other.write_text(METRICS.read_text())

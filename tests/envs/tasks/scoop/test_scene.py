@@ -36,6 +36,7 @@ def test_same_number_gives_the_same_scene_byte_for_byte_which_cannot_be_changed(
             of_a[0] = 1.0
 
 
+@pytest.mark.slow
 def test_scene_sets_share_no_scene_and_every_soil_preset_makes_another_pile():
     scenes = [draw_scene(*of) for of in SCENES] + [draw_scene("train", 0, soil=s) for s in PRESETS if s != "sand"]
     assert len({scene.heights_m.tobytes() for scene in scenes}) == len(scenes)

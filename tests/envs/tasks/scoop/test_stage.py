@@ -33,6 +33,7 @@ def test_stage_0_is_the_scene_itself():
     assert start_at(0) is draw_scene(*SCENE, soil="sand")
 
 
+@pytest.mark.slow
 def test_stages_are_drawn_once_and_the_same_again(starts):
     assert start_at(2) is starts[2]
     stage._later_start.cache_clear()

@@ -43,6 +43,7 @@ def test_operator_goes_through_its_phases_in_order(env):
     assert set(phases) >= set(PHASES[:-1])
 
 
+@pytest.mark.slow
 def test_same_generator_gives_the_same_demonstration_and_another_another_style(env):
     first, again, other = (drive(env, scene_id=1, target_id=2, seed=seed)[0] for seed in (3, 3, 4))
     assert np.array_equal(first, again)

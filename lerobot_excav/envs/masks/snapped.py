@@ -1,0 +1,60 @@
+"""Imprecise masks, snapped onto what lies under their middle: what a policy needs that was trained with exact ones."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lerobot_excav.envs.masks.command import Command
+from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.shot import reduced
+from lerobot_excav.envs.masks.source import MaskView, TargetMask
+
+if TYPE_CHECKING:
+    from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
+
+
+class SnappedSource:
+    """Marks what lies under the middle of each mask, by the click segmenter that comes with the package.
+
+    It looks once for a command, so a mask that flickers is held as it was snapped. Where the segmenter marks nothing,
+    the mask stays as it was.
+
+    Args:
+        source: Where the imprecise masks come from.
+    """
+
+    def __init__(self, source: CorruptedSource) -> None:
+        self._source = source
+        self._segmenter: ClickSegmenter | None = None
+
+    def mask(self, view: MaskView, command: Command) -> TargetMask | None:
+        """Return the snapped mask of a command.
+
+        Raises:
+            ConfigurationError: The source returns something else than a mask of the picture's size.
+            ExcavError: No other place is free for the blob of a `random` mask.
+        """
+        shown = self._source.mask(view, command)
+        if shown is None:
+            return None
+        shown = self._source.at_frame(shown, view, command, command.since_frame)
+        middle = (np.argwhere(shown.pixels).mean(axis=0) + 0.5) / shown.pixels.shape
+        fine = self.segmenter.pixels(view.shot().picture, *map(float, middle))
+        pixels = reduced(fine, (view.camera.height, view.camera.width))
+        found = bool(pixels.any())
+        facts = {**shown.parameters, "snap": "snapped" if found else "nothing there"}
+        return replace(shown, pixels=pixels if found else shown.pixels, parameters=facts)
+
+    def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
+        """Return a mask of this source as it is shown at a frame: itself."""
+        return mask
+
+    @property
+    def segmenter(self) -> "ClickSegmenter":
+        """The network, loaded at first use: PyTorch takes seconds."""
+        if self._segmenter is None:
+            from lerobot_excav.envs.masks.click.segmenter import BUILT_IN, ClickSegmenter
+
+            self._segmenter = ClickSegmenter.load(BUILT_IN)
+        return self._segmenter

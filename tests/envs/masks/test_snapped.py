@@ -1,0 +1,76 @@
+"""Imprecise masks are snapped onto what lies under their middle; `fr5_grasp` shows it, and its blocks are objects."""
+
+import numpy as np
+import pytest
+
+from lerobot_excav.envs.masks.corrupted import CorruptedSource
+from lerobot_excav.envs.masks.oracle import OracleSource
+from lerobot_excav.envs.masks.snapped import SnappedSource
+from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
+
+SCENES = range(6)
+SHIFT = {"mask_noise": "shift", "mask_noise_px": 4}
+
+
+def masks(**settings):
+    """Return the first mask of some scenes, (n, H, W) bool."""
+    env = FR5GraspEnv(scene_set="val", **settings)
+    shown = []
+    for scene in SCENES:
+        env.reset(seed=scene)
+        shown.append(env.mask.pixels)
+    env.close()
+    return np.stack(shown)
+
+
+def overlap(some, others):
+    """Return the intersection over union of masks, one by one."""
+    return (some & others).sum(axis=(1, 2)) / (some | others).sum(axis=(1, 2))
+
+
+@pytest.fixture(scope="module")
+def right():
+    return masks()
+
+
+@pytest.mark.parametrize("noise", ["shift", "flicker"])
+def test_masks_that_lie_beside_their_blocks_are_brought_back(right, noise):
+    settings = {**SHIFT, "mask_noise": noise}
+    assert overlap(masks(mask_snap=True, **settings), right).min() > 0.8
+
+
+def test_masks_that_lie_beside_their_blocks_stay_there_otherwise(right):
+    assert overlap(masks(**SHIFT), right).max() < 0.6
+
+
+def test_exact_masks_stay_nearly_as_they_are(right):
+    assert overlap(masks(mask_snap=True), right).min() > 0.8
+
+
+def test_a_flickering_mask_is_held_as_it_was_snapped():
+    env = FR5GraspEnv(scene_set="val", mask_noise="flicker", mask_noise_px=3, mask_snap=True)
+    env.reset(seed=1)
+    first = env.mask.pixels
+    for _ in range(4):
+        env.step(env.holding_action())
+        assert np.array_equal(env.mask.pixels, first)
+    env.close()
+
+
+class Blind:
+    """A segmenter that marks nothing."""
+
+    def pixels(self, picture, row, column):
+        return np.zeros((384, 512), dtype=bool)
+
+
+def test_a_mask_under_which_nothing_is_found_stays_and_says_so():
+    env = FR5GraspEnv(scene_set="val")
+    env.reset(seed=1)
+    corrupted = CorruptedSource(OracleSource(), condition="correct", noise="none", noise_px=0)
+    source = SnappedSource(corrupted)
+    source._segmenter = Blind()
+    mask = source.mask(env, env.command)
+    assert np.array_equal(mask.pixels, env.mask.pixels)
+    assert mask.parameters["snap"] == "nothing there"
+    env.close()
