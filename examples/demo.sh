@@ -13,7 +13,7 @@ require_checkpoint "$CHECKPOINT"
 say "Clearing the pile of test scene $SCENE -> $OUT"
 rm -rf "$OUT/play" "$OUT/film" "$OUT/metrics.jsonl"
 lerobot-eval --policy.path="$CHECKPOINT" --policy.device=cpu \
-  --env.type=excavator --env.task=Clear-v0 --env.scene_set=test --seed="$SCENE" --env.camera_every=5 \
+  --env.type=excavator --env.task=Clear-v0 --env.scene_set=test --seed="$SCENE" --policy.n_action_steps=5 --env.camera_every=5 \
   --env.film_folder="$OUT/film" --env.film_every="$EVERY" --env.render_camera=overview_with_side \
   --env.render_every=1000 --env.render_height=32 --env.render_width=32 --env.metrics_path="$OUT/metrics.jsonl" \
   --eval.n_episodes=1 --eval.batch_size=1 --output_dir="$OUT/play"

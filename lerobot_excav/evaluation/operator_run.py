@@ -13,6 +13,7 @@ from lerobot_excav.datasets.record.simulation import play_demonstration
 from lerobot_excav.datasets.record.workers import episode_results, submit_episodes, worker_pool
 from lerobot_excav.envs.configs.metrics_log import json_line
 from lerobot_excav.envs.configs.provenance import write_provenance
+from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import ConfigurationError, DatasetError, ExcavError
 from lerobot_excav.run_lock import RunLock
 from lerobot_excav.whole_file import named, write_whole
@@ -130,14 +131,15 @@ def _finished_lines(partial: Path, settings: PlayedScenes, pairs: list[Pair]) ->
             "continue it with the same options, or remove the file"
         )
     for line, pair in zip(whole, pairs, strict=False):
-        _require_line(line, partial, _expected(settings, pair))
+        _require_line(line, partial, _expected(settings, pair), earlier=type(settings.env))
     head = json_line({"episode_ix": len(whole), **_operator(settings)}).rstrip("}\n")
     if not (torn.startswith(head) or head.startswith(torn)):
         raise _not_ours(partial)
     return [f"{line}\n" for line in whole]
 
 
-def _require_line(line: str, partial: Path, expected: dict[str, Any]) -> None:
+def _require_line(line: str, partial: Path, expected: dict[str, Any], *, earlier: type[TaskSettings]) -> None:
+    """Check a line; a setting that it lacks had not been there yet, so it was at its default."""
     try:
         record = json.loads(line)
     except ValueError as error:
@@ -145,7 +147,7 @@ def _require_line(line: str, partial: Path, expected: dict[str, Any]) -> None:
     if not isinstance(record, dict) or "operator_seed" not in record:
         raise _not_ours(partial)
     for name, value in expected.items():
-        if record.get(name) != value:
+        if record.get(name, getattr(earlier, name, None)) != value:
             raise ConfigurationError(
                 f"{partial} was started with {name}={record.get(name)!r}, not {value!r}; "
                 "continue it with the same options, or remove the file"

@@ -22,7 +22,7 @@ WRONG = {
 FIELDS = {
     **dict.fromkeys(("simulation_version", "fps", "episode_length", "scene_id", "target_id"), "count"),
     **dict.fromkeys(("mask_noise_px", "frames", "mask_missing_frames"), "count"),
-    **dict.fromkeys(("mask_snap", "target_overlay", "is_success", "mask_missing"), "truth"),
+    **dict.fromkeys(("target_overlay", "is_success", "mask_missing"), "truth"),
     **dict.fromkeys(("task", "scene_set", "mask_source", "mask_condition", "mask_noise"), "word"),
 }
 OWN_FIELDS = {

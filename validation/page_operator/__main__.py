@@ -43,9 +43,7 @@ def play(page: Any, onlooker: SocketPage, plan: Plan, *, scene_id: int, target_i
     overlay.click(position={"x": place["x"] * box["width"], "y": place["y"] * box["height"]})
     onlooker.wait(lambda state: state["target"] == target_id and state["ready"])
     page.locator("#drive").click()
-    page.evaluate("plan => { window.plan = plan; }", plan.sticks)
-    frames = 2 * len(plan.sticks)
-    onlooker.wait(lambda state: state["over"] or state["frame"] >= frames, limit_s=300.0)
+    losses = hold_sticks(page, onlooker, plan)
     state = onlooker.state
     return {
         "simulation_version": SCOOP.simulation_version,
@@ -58,7 +56,28 @@ def play(page: Any, onlooker: SocketPage, plan: Plan, *, scene_id: int, target_i
         "speed": state["speed"],
         "measured": state["measured"],
         "delay": page.locator("#delay").inner_text(),
+        "losses": losses,
     }
+
+
+def hold_sticks(page: Any, onlooker: SocketPage, plan: Plan) -> int:
+    """Hold the planned sticks until the cycle is over, or twice its time; return how often they were lost.
+
+    Where the page was not heard for too long, sticks count only once they were let go: a person does it, and goes on.
+    """
+    losses, frames = 0, 2 * len(plan.sticks)
+
+    def is_over(state: dict[str, Any]) -> bool:
+        return bool(state["over"] or state["frame"] >= frames)
+
+    while not is_over(onlooker.state):
+        page.evaluate("plan => { window.plan = plan; }", plan.sticks)
+        onlooker.wait(lambda state: is_over(state) or not state["ready"], limit_s=300.0)
+        if not is_over(onlooker.state):
+            losses += 1
+            page.evaluate("window.plan = null")
+            onlooker.wait(lambda state: is_over(state) or state["ready"])
+    return losses
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -112,6 +131,8 @@ def summary(cycles: Sequence[dict[str, Any]]) -> list[str]:
         lines.append(f"{words}: {rate_words(sum(cycle[key] for cycle in cycles), len(cycles))}")
     lost = [(c["scene_id"], c["target_id"]) for c in cycles if c["is_success_without_page"] and not c["is_success"]]
     lines.append(f"lost through the page: {lost or 'none'}")
+    interrupted = sum(cycle.get("losses", 0) > 0 for cycle in cycles)
+    lines.append(f"cycles in which the page was not heard for a while: {interrupted}")
     return lines
 
 

@@ -150,7 +150,8 @@ def _picture_of_mask_problems(episode: EpisodeTable, frame: int) -> Iterator[str
 
 
 def _flickers(episode: EpisodeTable) -> bool:
-    return any(change.startswith("flicker ") for change in episode.mask_changes)
+    changes = episode.mask_changes
+    return SNAPPED not in changes and any(change.startswith("flicker ") for change in changes)
 
 
 def mask_problems(episode: EpisodeTable) -> Iterator[str]:

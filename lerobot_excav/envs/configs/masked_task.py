@@ -49,9 +49,9 @@ class MaskedTaskEnvConfig(RenderSettings, EnvConfig):  # type: ignore[misc]  # L
         "rgb_array, from which LeRobot makes videos, or null", default="rgb_array", choices=RENDER_MODES
     )
     camera_every: int = setting(
-        "Draw what the policy sees every n-th frame, and when the mask changes, and show it until then. With the same "
-        "--policy.n_action_steps the results are the same, for mask_act looks at no other pictures, and evaluation is "
-        "faster",
+        "Draw what the policy sees every n-th frame, counted from the start and from the last change of the mask, and "
+        "show it until then. With the same --policy.n_action_steps the results of mask_act are the same, for it looks "
+        "at no other pictures, and evaluation is faster; other policies see a slow camera",
         default=1,
         low=1,
         high=MOST_HELD_FRAMES,

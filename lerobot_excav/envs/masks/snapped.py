@@ -1,4 +1,4 @@
-"""Imprecise masks, snapped onto what lies under their middle: what a policy needs that was trained with exact ones."""
+"""Imprecise masks of objects, snapped onto what lies under their middle: for policies trained with exact ones."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -10,6 +10,9 @@ from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.shot import reduced
 from lerobot_excav.envs.masks.source import MaskView, TargetMask
 
+LEAST_SHARE, MOST_SHARE = 0.25, 4.0
+"""Pixels of the snapped mask over those of the mask; beyond, something else was marked (kind: guess)."""
+
 if TYPE_CHECKING:
     from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
 
@@ -17,8 +20,8 @@ if TYPE_CHECKING:
 class SnappedSource:
     """Marks what lies under the middle of each mask, by the click segmenter that comes with the package.
 
-    It looks once for a command, so a mask that flickers is held as it was snapped. Where the segmenter marks nothing,
-    the mask stays as it was.
+    It looks once for a command, so a mask that flickers is held as it was snapped. Where the segmenter marks nothing
+    that is like the mask in size and overlaps it, the mask stays as it was.
 
     Args:
         source: Where the imprecise masks come from.
@@ -33,7 +36,6 @@ class SnappedSource:
 
         Raises:
             ConfigurationError: The source returns something else than a mask of the picture's size.
-            ExcavError: No other place is free for the blob of a `random` mask.
         """
         shown = self._source.mask(view, command)
         if shown is None:
@@ -42,8 +44,9 @@ class SnappedSource:
         middle = (np.argwhere(shown.pixels).mean(axis=0) + 0.5) / shown.pixels.shape
         fine = self.segmenter.pixels(view.shot().picture, *map(float, middle))
         pixels = reduced(fine, (view.camera.height, view.camera.width))
-        found = bool(pixels.any())
-        facts = {**shown.parameters, "snap": "snapped" if found else "nothing there"}
+        share = pixels.sum() / shown.pixels.sum()
+        found = LEAST_SHARE <= share <= MOST_SHARE and bool((pixels & shown.pixels).any())
+        facts = {**shown.parameters, "snap": "snapped" if found else "nothing like it there"}
         return replace(shown, pixels=pixels if found else shown.pixels, parameters=facts)
 
     def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:

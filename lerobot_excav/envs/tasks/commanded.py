@@ -326,7 +326,9 @@ class CommandedEnv(WatchedEnv):
         covered_w = self.places_w()[pixels]
         covered_w = covered_w[np.isfinite(covered_w).all(axis=-1)]
         require(len(covered_w) > 0, "the mask covers nothing to act on; mark soil, or a block")
-        return self._point(self._target_at(covered_w.mean(axis=0)), shown_source(PointedSource(pixels), self.settings))
+        return self._point(
+            self._target_at(covered_w.mean(axis=0)), shown_source(PointedSource(pixels), self.settings, may_snap=False)
+        )
 
     def _point(self, target_id: int, source: ShownSource) -> Seen:
         """Command a target by a source's mask; without one, everything stays as it was."""

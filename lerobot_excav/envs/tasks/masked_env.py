@@ -20,7 +20,7 @@ from lerobot_excav.envs.tasks.registry import task_played_by
 from lerobot_excav.envs.tasks.selection import Selection, select_episode
 from lerobot_excav.envs.tasks.settings import RenderSettings
 from lerobot_excav.envs.tasks.shown_source import shown_source
-from lerobot_excav.errors import require_choice, require_integer
+from lerobot_excav.errors import require, require_choice, require_integer
 from lerobot_excav.setting import declared_settings
 
 RENDER_MODES = ("rgb_array", None)
@@ -51,7 +51,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         obs_type: One of `task.OBS_TYPES`.
         render_mode: `rgb_array` or None.
         depth_info: Whether `info["depth_m"]` holds the result of `depth_m()`; never an observation of a policy.
-        camera_every: Draw what policies see every n-th frame, and when the mask changes, and hold it until then.
+        camera_every: Draw what policies see every n-th frame only, see `HeldPictures`.
         settings: Fields of the task's `TaskSettings` and of `RenderSettings`, by name.
 
     Raises:
@@ -90,6 +90,11 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32), dtype=np.float32
         )
         require_integer("camera_every", camera_every, 1, MOST_HELD_FRAMES)
+        require(
+            camera_every == 1 or (self._shows_pixels and not depth_info),
+            f"camera_every={camera_every} has no meaning with obs_type={obs_type!r} and depth_info={depth_info}: it "
+            "holds pictures, and depth is of every frame; leave it out",
+        )
         self._held = HeldPictures(camera_every)
         self._ticks_per_frame = TICKS_PER_SECOND // self.fps
         self._source = self._named_source = shown_source(
@@ -234,7 +239,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         if not self._shows_pixels:
             return {"agent_pos": self.agent_pos, **state}
         mask = None if self.mask is None else self.mask.pixels
-        pixels = self._held.shown(self._frame + self._missing_frames, mask, self._draw_all)
+        pixels = self._held.shown(self._frame, mask, self._draw_all)
         return {"agent_pos": self.agent_pos, **state, "pixels": pixels}
 
     def _draw_all(self) -> dict[str, NDArray[np.uint8]]:

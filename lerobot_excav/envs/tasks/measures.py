@@ -119,7 +119,7 @@ class EpisodeRecord(BaseModel):
 
     @property
     def mask_words(self) -> str:
-        """What the mask showed, in words, whenever the command changed."""
+        """What the mask showed and how often pictures were drawn, in words, whenever the command changed."""
         words = [self.mask_condition]
         if self.mask_source != "oracle":
             words.append(f"from {self.mask_source}")
@@ -129,6 +129,8 @@ class EpisodeRecord(BaseModel):
             words.append(SNAPPED)
         if self.target_overlay:
             words.append("as overlay")
+        if self.camera_every > 1:
+            words.append(f"camera every {self.camera_every} frames")
         return ", ".join(words)
 
     @property

@@ -132,8 +132,8 @@ class TaskSettings:
     mask_noise: str = setting("Error that is added to the mask", default="none", choices=MASK_NOISES)
     mask_noise_px: int = setting("Size of that error [px]", default=0, low=0, high=_MOST_IMAGE_PX)
     mask_snap: bool = setting(
-        "Whether a small network that looks at the picture marks what lies under the middle of the mask, and that is "
-        "shown in its place: mends masks that lie beside their object",
+        "Whether a small network that looks at the picture marks the object under the middle of the mask, and that is "
+        "shown in its place: mends masks that lie a little off their object",
         default=False,
     )
     target_overlay: bool = setting(
@@ -166,9 +166,9 @@ class TaskSettings:
             "mask; leave one of them out",
         )
         require(
-            self.mask_condition != "zero" or not self.mask_snap,
-            f"{prefix}mask_snap=True has no effect with {prefix}mask_condition='zero', which shows no mask; leave one "
-            "of them out",
+            self.mask_condition not in ("zero", "random") or not self.mask_snap,
+            f"{prefix}mask_snap=True has no meaning with {prefix}mask_condition={self.mask_condition!r}, whose mask "
+            "lies on no object; leave one of them out",
         )
 
     @property
@@ -217,7 +217,8 @@ class TaskSettings:
     @property
     def mask_faults(self) -> tuple[str, ...]:
         """What is wrong with the mask on purpose, in words."""
-        return tuple(f"mask: {error}" for error in self._mask_errors)
+        snapped = (SNAPPED,) if self.mask_snap else ()
+        return tuple(f"mask: {error}" for error in (*self._mask_errors, *snapped))
 
     @property
     def _mask_errors(self) -> tuple[str, ...]:

@@ -129,7 +129,8 @@ def _require_same(settings: AuditSettings, path: Path) -> None:
     with reading(path):
         theirs = json.loads(path.read_text(encoding="utf-8"))
     for name, mine in record.items():
-        if mine != theirs.get(name):
+        # A setting that was not there yet was at its default.
+        if mine != theirs.get(name, getattr(type(settings.env), name.removeprefix("env."), None)):
             raise ConfigurationError(
                 f"{path.parent} holds scenes of another audit: {name} is {theirs.get(name)!r} there, and {mine!r} is "
                 "asked for; give the same options, or choose another --out"

@@ -123,6 +123,7 @@ def test_sound_episodes_of_other_masks_and_tables_pass_also_together(tmp_path):
         "oracle, zero": {"mask_condition": "zero"},
         "oracle, mismatched": {"mask_condition": "mismatched"},
         "oracle, dilate 40 px": {"mask_noise": "dilate", "mask_noise_px": 40},
+        "oracle, shift 1 px, snapped": {"mask_noise": "shift", "mask_noise_px": 1, "mask_snap": True},
         "oracle, as overlay": {"target_overlay": True},
     }
     for words, env in others.items():
@@ -130,9 +131,9 @@ def test_sound_episodes_of_other_masks_and_tables_pass_also_together(tmp_path):
     merge_datasets([load(tmp_path / words) for words in others], "local/m", output_dir=tmp_path / "m")
     report = check_dataset(tmp_path / "m", replays=20)
     assert report.problems == []
-    assert report.episodes["qc_problem"].tolist() == [""] * 20
+    assert report.episodes["qc_problem"].tolist() == [""] * 24
     rows = build_index(tmp_path / "m")
-    assert rows["table"].tolist() == ["ice"] * 4 + ["wood"] * 16
+    assert rows["table"].tolist() == ["ice"] * 4 + ["wood"] * 20
     assert rows["mask_source"].tolist() == [words for words in others for _ in range(4)]
 
 

@@ -57,20 +57,29 @@ def test_a_flickering_mask_is_held_as_it_was_snapped():
     env.close()
 
 
-class Blind:
-    """A segmenter that marks nothing."""
+class Wrong:
+    """A segmenter that marks a square, wherever it is asked."""
+
+    def __init__(self, rows, columns):
+        self._marked = np.zeros((384, 512), dtype=bool)
+        self._marked[rows, columns] = True
 
     def pixels(self, picture, row, column):
-        return np.zeros((384, 512), dtype=bool)
+        return self._marked
 
 
-def test_a_mask_under_which_nothing_is_found_stays_and_says_so():
+@pytest.mark.parametrize(
+    "wrong",
+    [Wrong(slice(0), slice(0)), Wrong(slice(0, 30), slice(0, 30)), Wrong(slice(0, 384), slice(0, 512))],
+    ids=["nothing", "elsewhere", "everything"],
+)
+def test_a_mask_under_which_nothing_like_it_is_found_stays_and_says_so(wrong):
     env = FR5GraspEnv(scene_set="val")
     env.reset(seed=1)
     corrupted = CorruptedSource(OracleSource(), condition="correct", noise="none", noise_px=0)
     source = SnappedSource(corrupted)
-    source._segmenter = Blind()
+    source._segmenter = wrong
     mask = source.mask(env, env.command)
     assert np.array_equal(mask.pixels, env.mask.pixels)
-    assert mask.parameters["snap"] == "nothing there"
+    assert mask.parameters["snap"] == "nothing like it there"
     env.close()

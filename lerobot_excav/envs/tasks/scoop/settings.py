@@ -46,6 +46,10 @@ class ExcavatorSettings(RetargetSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require(
+            not self.mask_snap,
+            f"{self.PREFIX}mask_snap=True has no use on the ground, where every place can be meant; leave it out",
+        )
         zones = parsed_zones(f"{self.PREFIX}keep_out", self.keep_out)
         self.keep_out = zone_text(zones)
         require(
