@@ -84,13 +84,13 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data": 4, "train": 6, "val": 4, "test": 26, "checkpoint": 1, "report": 1, "all": 1}
+    stages = {"data": 4, "train": 6, "val": 4, "test": 31, "checkpoint": 1, "report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
 
 def test_every_stage_of_the_excavator_is_planned(dig_plan):
     stages = {"data_shard": 3, "data": 3, "slim": 3, "train": 15, "checkpoint": 15, "operator": 2}
-    stages |= {"play_shard": 30, "play": 30, "audit": 1, "report": 1, "all": 1}
+    stages |= {"play_shard": 180, "play": 30, "audit": 1, "report": 1, "all": 1}
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
 
 
@@ -126,6 +126,8 @@ def test_metrics_of_shards_are_put_together_in_their_order(tmp_path):
     assert (tmp_path / "whole.jsonl").read_text() == '{"scene_id": 0}\n{"scene_id": 1}\n'
     merged = json.loads((tmp_path / "whole.json").read_text())
     assert merged == {"command": "play a && play b", "commit": "c", "modified": True, "seconds": 4.0}
+    shards["remove_parts"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"])
+    assert {path.name for path in tmp_path.iterdir()} == {"whole.jsonl", "whole.json"}
 
 
 @pytest.mark.parametrize(("count", "shards"), [(30, 7), (1, 1), (3, 5), (120, 30)])

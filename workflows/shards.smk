@@ -25,3 +25,13 @@ def merge_metrics(parts, whole):
         "modified": any(origin["modified"] for origin in origins),
     }
     whole.with_suffix(".json").write_text(json.dumps(merged, indent=1) + "\n", encoding="utf-8")
+
+
+def remove_parts(parts):
+    """Remove metrics files whose whole is written, with what says where they come from, and their folder if empty."""
+    for part in map(Path, parts):
+        part.unlink()
+        part.with_suffix(".json").unlink()
+    for folder in {Path(part).parent for part in parts}:
+        if not any(folder.iterdir()):
+            folder.rmdir()

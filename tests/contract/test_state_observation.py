@@ -56,17 +56,16 @@ def test_another_target_changes_what_is_said_of_the_target_alone(task):
 
 
 @pytest.mark.parametrize(
-    "setting",
-    [
-        {"mask_condition": "zero"},
-        {"mask_noise": "shift", "mask_noise_px": 2},
-        {"mask_snap": True},
-        {"target_overlay": True},
-    ],
+    "setting", [{"mask_condition": "zero"}, {"mask_noise": "shift", "mask_noise_px": 2}, {"target_overlay": True}]
 )
 def test_a_mask_that_nobody_sees_cannot_be_corrupted(setting):
     with pytest.raises(ConfigurationError, match=rf"{next(iter(setting))}=.* has no effect with obs_type='state'"):
         made("Scoop-v0", **setting)
+
+
+def test_a_mask_that_nobody_sees_cannot_be_snapped():
+    with pytest.raises(ConfigurationError, match=r"mask_snap=True has no effect with obs_type='state'"):
+        made("FR5Grasp-v0", mask_snap=True)
 
 
 def test_a_task_that_names_no_elements_refuses_it():

@@ -41,7 +41,8 @@ def play(page: Any, onlooker: SocketPage, plan: Plan, *, scene_id: int, target_i
     box = overlay.bounding_box()
     place = next(t for t in onlooker.state["targets"] if t["number"] == target_id)
     overlay.click(position={"x": place["x"] * box["width"], "y": place["y"] * box["height"]})
-    onlooker.wait(lambda state: state["target"] == target_id and state["ready"])
+    # The target may be the one of the start; what is clicked before the console has answered is not heard.
+    onlooker.wait(lambda state: state["target"] == target_id and "is commanded" in state["words"] and state["ready"])
     page.locator("#drive").click()
     losses = hold_sticks(page, onlooker, plan)
     state = onlooker.state
