@@ -45,7 +45,7 @@ def played(vector, seed=3):
     return steps
 
 
-@pytest.mark.parametrize("autoreset_mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("autoreset_mode", ["NextStep", pytest.param("SameStep", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("obs_type", ["agent_pos", pytest.param("pixels_agent_pos", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("spec", OWN, ids=lambda spec: spec.id)
 def test_each_world_is_bit_by_bit_the_one_that_it_would_be_alone(spec, obs_type, autoreset_mode):

@@ -38,6 +38,7 @@ def energy(state):
     return float(0.5 * (moving + spinning).sum() + GRAVITY_M_S2 * state.masses @ state.positions[:, 2])
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**16), has_tool=st.booleans())
 @settings(max_examples=25)
 def test_sub_steps_are_those_of_the_reference(seed, has_tool):

@@ -92,6 +92,7 @@ def test_growing_beyond_the_first_room_and_clearing_change_nothing(monkeypatch):
     assert all(run == runs[0] for run in runs)
 
 
+@pytest.mark.slow
 def test_parcels_that_come_and_go_leave_the_memory_of_the_others_alone():
     """Heaps slide along a smooth gutter over the border: what touches the ground there leaves at once."""
     smooth = LAWS._replace(ground=LAWS.ground._replace(sliding=0.0, rolling=0.0))

@@ -1,6 +1,7 @@
 """Which regions the planner proposes."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -119,6 +120,7 @@ def test_a_zone_between_region_and_machine_bars_it():
         assert is_barred(place_w, [zone], inner_radius_m=2.5, half_size_m=0.4).tolist() == [barred]
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(scenes, st.integers(1, 4))
 def test_regions_that_brought_nothing_come_after_all_others_and_the_least_tried_of_them_first(scene_id, tries):
