@@ -1,6 +1,7 @@
 """Where the emulated machine works: one start after the other, each until its cycle is over."""
 
 from collections.abc import Callable
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.scoop.scene import draw_scene
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.shown_source import shown_source
 from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
@@ -45,6 +48,7 @@ class EmulatedSite:
         on_over: Callable[[dict[str, Any]], None] = lambda metrics: None,
     ) -> None:
         settings.require_commanded_mask()
+        self._settings = settings
         self._spec = task_of_settings(settings)
         # Without pictures of its own: at 50 Hz nobody could draw them all.
         self._env = self._spec.make_env(
@@ -99,3 +103,11 @@ class EmulatedSite:
         scene_id, target_id = divmod(self._start, self._spec.starts_per_scene)
         self._env.reset(options={"scene_id": scene_id, "target_id": target_id})
         self._look()
+        self._draw_ahead(scene_id + 1)
+
+    def _draw_ahead(self, scene_id: int) -> None:
+        """Draw a later scene meanwhile: that can take longer than a robot waits for a picture. Drawn scenes are kept."""
+        settings = self._settings
+        if isinstance(settings, ExcavatorSettings):
+            options = {"soil": settings.soil}
+            Thread(target=draw_scene, args=(settings.scene_set, scene_id), kwargs=options, daemon=True).start()

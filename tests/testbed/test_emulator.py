@@ -8,6 +8,7 @@ import pytest
 
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.testbed import emulated_site
 from lerobot_excav.testbed.emulated_site import EmulatedSite
 from lerobot_excav.testbed.emulator import EmulatedMachine
 from lerobot_excav.testbed.faulty_wire import WireFaults
@@ -230,6 +231,13 @@ def test_sensors_are_noisy_as_asked_and_the_seed_decides():
             seen.append(link.heard().state.joint_pos)
             time.sleep(0.03)
         assert 0.006 < np.std(np.unique(seen, axis=0), axis=0).mean() < 0.014
+
+
+def test_the_next_scene_is_drawn_before_its_turn(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(emulated_site, "draw_scene", lambda *place, soil: drawn.append((*place, soil)))
+    with emulated({"scene_set": "val", "soil": "gravel"}):
+        until(lambda: drawn == [("val", 1, "gravel")])
 
 
 def test_a_mask_that_flickers_lies_elsewhere_at_every_tick():

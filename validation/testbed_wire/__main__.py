@@ -65,24 +65,31 @@ def _of(played: Sequence[dict[str, Any]], wire: Wire, policy: str) -> list[dict[
 
 
 def _play(wire: Wire, policy: Path, cycles: int, path: Path) -> None:
-    """Play what is missing of a condition; a scene is kept when its four cycles are over."""
-    scenes = len(_of(read_finished(path), wire, policy.name)) // SCOOP.target_count
-    missing = cycles - scenes * SCOOP.target_count
-    if missing <= 0:
-        return
+    """Play the scenes that are missing of a condition.
+
+    Each begins with programs of its own: to make another scene can take the emulator longer than the robot waits for a
+    picture.
+    """
+    done = len(_of(read_finished(path), wire, policy.name)) // SCOOP.target_count
+    for scene_id in range(done, cycles // SCOOP.target_count):
+        _play_scene(wire, policy, scene_id, path)
+
+
+def _play_scene(wire: Wire, policy: Path, scene_id: int, path: Path) -> None:
+    """Play a cycle for each target of a scene; they are kept when all are over."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    scene: list[dict[str, Any]] = []
+    options: dict[str, Any] = {"checkpoint": policy, "scene_set": SCENE_SET, "first_scene": scene_id}
     with tempfile.TemporaryDirectory() as folder:
-        scene: list[dict[str, Any]] = []
-        options: dict[str, Any] = {"checkpoint": policy, "scene_set": SCENE_SET, "first_scene": scenes}
-        for number, cycle in enumerate(cycles_behind(wire, count=missing, folder=Path(folder), **options), start=1):
+        for cycle in cycles_behind(wire, count=SCOOP.target_count, folder=Path(folder), **options):
             scene.append({**wire._asdict(), "policy": policy.name, **{name: cycle[name] for name in KEPT}})
             words = "success" if cycle["is_success"] else "no success"
-            print(f"{wire.delay_ms} ms, {wire.loss:.0%} lost: cycle {number} of {missing}: {words}", flush=True)
-            if len(scene) == SCOOP.target_count:
-                with path.open("a", encoding="utf-8") as file:
-                    file.write("".join(json.dumps(line) + "\n" for line in scene))
-                scene.clear()
+            print(
+                f"{wire.delay_ms} ms, {wire.loss:.0%} lost: scene {scene_id}, cycle {len(scene)}: {words}", flush=True
+            )
         print(late_ticks(Path(folder)), flush=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write("".join(json.dumps(line) + "\n" for line in scene))
 
 
 def table(conditions: Sequence[tuple[Wire, Sequence[dict[str, Any]]]]) -> list[str]:

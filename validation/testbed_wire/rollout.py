@@ -17,6 +17,9 @@ HOST = "127.0.0.1"
 PATIENCE_S = 180.0
 """Longest time without the end of a cycle (kind: guess; a cycle has a limit of 20 s, and programs start within 60)."""
 
+LAST_LINES = 8
+"""Lines of a log that an error tells."""
+
 POLICY = ("--policy.device=cpu", "--policy.n_action_steps=5")
 LEROBOT = ("--fps=10", "--play_sounds=false", "--return_to_initial_position=false")
 
@@ -104,6 +107,12 @@ def _wait_for_line(log: Path, words: str, process: subprocess.Popen[bytes]) -> N
         time.sleep(0.2)
 
 
+def _ends_of_logs(folder: Path) -> str:
+    """Return the last lines of both programs, for their folder is temporary."""
+    logs = ((path.name, path.read_text(encoding="utf-8").splitlines()) for path in sorted(folder.glob("*.log")))
+    return "\n".join(f"{name}: {line}" for name, lines in logs for line in lines[-LAST_LINES:])
+
+
 def _next_cycle(metrics: Path, number: int, processes: tuple[subprocess.Popen[bytes], ...]) -> dict[str, Any]:
     deadline = time.monotonic() + PATIENCE_S
     while True:
@@ -112,5 +121,5 @@ def _next_cycle(metrics: Path, number: int, processes: tuple[subprocess.Popen[by
             cycle: dict[str, Any] = json.loads(lines[number])
             return cycle
         if any(process.poll() is not None for process in processes) or time.monotonic() > deadline:
-            raise RuntimeError(f"cycle {number} did not end; see the logs in {metrics.parent}")
+            raise RuntimeError(f"cycle {number} did not end; the logs end in\n{_ends_of_logs(metrics.parent)}")
         time.sleep(0.2)
