@@ -106,7 +106,7 @@ class EmulatedSite:
         self._draw_ahead(scene_id + 1)
 
     def _draw_ahead(self, scene_id: int) -> None:
-        """Draw a later scene meanwhile: that can take longer than a robot waits for a picture. Drawn scenes are kept."""
+        """Draw a later scene meanwhile, which is kept: that can take longer than a robot waits for a picture."""
         settings = self._settings
         if isinstance(settings, ExcavatorSettings):
             options = {"soil": settings.soil}
