@@ -78,6 +78,8 @@ def test_after_a_change_of_the_command_the_last_one_counts(make_run, grasp_line)
         ({"mask_noise": "shift", "mask_noise_px": 4}, "correct, shift 4 px"),
         ({"mask_condition": "mismatched", "target_overlay": True}, "mismatched, as overlay"),
         ({"mask_source": "detector"}, "correct, from detector"),
+        ({"mask_noise": "shift", "mask_noise_px": 4, "mask_snap": True}, "correct, shift 4 px, snapped"),
+        ({"camera_every": 5}, "correct, camera every 5 frames"),
         ({"commands": [[0, 0], [25, 3], [60, 1]]}, "correct, changed at frame 25 and 60"),
     ],
 )

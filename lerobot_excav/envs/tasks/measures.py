@@ -118,8 +118,8 @@ class EpisodeRecord(BaseModel):
         return tuple(command.frame for command in self.commands[1:])
 
     @property
-    def mask_words(self) -> str:
-        """What the mask showed and how often pictures were drawn, in words, whenever the command changed."""
+    def shown_words(self) -> str:
+        """What the mask showed, in words, whenever the command changed."""
         words = [self.mask_condition]
         if self.mask_source != "oracle":
             words.append(f"from {self.mask_source}")
@@ -129,9 +129,13 @@ class EpisodeRecord(BaseModel):
             words.append(SNAPPED)
         if self.target_overlay:
             words.append("as overlay")
-        if self.camera_every > 1:
-            words.append(f"camera every {self.camera_every} frames")
         return ", ".join(words)
+
+    @property
+    def mask_words(self) -> str:
+        """The same, and how often pictures were drawn unless it was at every frame."""
+        rare = f", camera every {self.camera_every} frames" if self.camera_every > 1 else ""
+        return f"{self.shown_words}{rare}"
 
     @property
     def mask(self) -> str:

@@ -156,7 +156,7 @@ def clear_sentence(piles: Sequence[ClearRecord]) -> str:
     what = f"{removed:.0f} % of the pile was removed in {number}"
     if count != 1:
         what = f"Of {count} piles {removed:.0f} % was removed on average, in {number} each"
-    masks = {pile.mask for pile in piles}
+    masks = {pile.shown_words for pile in piles}
     contacts = sum(pile.hard_target_contacts for pile in piles)
     hit_hard = {0: "never hit hard", 1: "hit hard once"}.get(contacts, f"hit hard {contacts} times")
     return (
