@@ -103,7 +103,7 @@ def _wait_for_line(log: Path, words: str, process: subprocess.Popen[bytes]) -> N
     deadline = time.monotonic() + PATIENCE_S
     while words not in log.read_text(encoding="utf-8"):
         if process.poll() is not None or time.monotonic() > deadline:
-            raise RuntimeError(f"the emulator did not start; see {log}")
+            raise RuntimeError(f"the emulator did not start; the logs end in\n{_ends_of_logs(log.parent)}")
         time.sleep(0.2)
 
 

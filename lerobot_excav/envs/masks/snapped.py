@@ -1,10 +1,10 @@
 """Imprecise masks of objects, snapped onto what lies under their middle: for policies trained with exact ones."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lerobot_excav.envs.masks.click.source import ClickOptions, ClickSource
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.shot import reduced
@@ -12,9 +12,6 @@ from lerobot_excav.envs.masks.source import MaskView, TargetMask
 
 LEAST_SHARE, MOST_SHARE = 0.25, 4.0
 """Pixels of the snapped mask over those of the mask; beyond, something else was marked (kind: guess)."""
-
-if TYPE_CHECKING:
-    from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
 
 
 class SnappedSource:
@@ -28,8 +25,7 @@ class SnappedSource:
     """
 
     def __init__(self, source: CorruptedSource) -> None:
-        self._source = source
-        self._segmenter: ClickSegmenter | None = None
+        self._source, self._clicks = source, ClickSource(ClickOptions())
 
     def mask(self, view: MaskView, command: Command) -> TargetMask | None:
         """Return the snapped mask of a command.
@@ -42,7 +38,7 @@ class SnappedSource:
             return None
         shown = self._source.at_frame(shown, view, command, command.since_frame)
         middle = (np.argwhere(shown.pixels).mean(axis=0) + 0.5) / shown.pixels.shape
-        fine = self.segmenter.pixels(view.shot().picture, *map(float, middle))
+        fine = self._clicks.segmenter.pixels(view.shot().picture, *map(float, middle))
         pixels = reduced(fine, (view.camera.height, view.camera.width))
         share = pixels.sum() / shown.pixels.sum()
         found = LEAST_SHARE <= share <= MOST_SHARE and bool((pixels & shown.pixels).any())
@@ -52,12 +48,3 @@ class SnappedSource:
     def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
         """Return a mask of this source as it is shown at a frame: itself."""
         return mask
-
-    @property
-    def segmenter(self) -> "ClickSegmenter":
-        """The network, loaded at first use: PyTorch takes seconds."""
-        if self._segmenter is None:
-            from lerobot_excav.envs.masks.click.segmenter import BUILT_IN, ClickSegmenter
-
-            self._segmenter = ClickSegmenter.load(BUILT_IN)
-        return self._segmenter

@@ -191,9 +191,8 @@ class TaskSettings:
     @property
     def mask_words(self) -> str:
         """What the mask shows, in words; datasets keep it as `excav.mask_source`."""
-        snapped = (SNAPPED,) if self.mask_snap else ()
         overlay = ("as overlay",) if self.target_overlay else ()
-        return ", ".join((self.mask_source, *self._mask_errors, *snapped, *overlay))
+        return ", ".join((self.mask_source, *self._mask_changes, *overlay))
 
     def require_mask_effect(self, obs_type: str) -> None:
         """Refuse settings of the mask where the target is told as numbers, exactly.
@@ -217,14 +216,13 @@ class TaskSettings:
     @property
     def mask_faults(self) -> tuple[str, ...]:
         """What is wrong with the mask on purpose, in words."""
-        snapped = (SNAPPED,) if self.mask_snap else ()
-        return tuple(f"mask: {error}" for error in (*self._mask_errors, *snapped))
+        return tuple(f"mask: {change}" for change in self._mask_changes)
 
     @property
-    def _mask_errors(self) -> tuple[str, ...]:
+    def _mask_changes(self) -> tuple[str, ...]:
         condition = () if self.mask_condition == "correct" else (self.mask_condition,)
         noise = () if self.mask_noise == "none" else (f"{self.mask_noise} {self.mask_noise_px} px",)
-        return (*condition, *noise)
+        return (*condition, *noise, *((SNAPPED,) if self.mask_snap else ()))
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:

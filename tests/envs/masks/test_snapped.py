@@ -78,7 +78,7 @@ def test_a_mask_under_which_nothing_like_it_is_found_stays_and_says_so(wrong):
     env.reset(seed=1)
     corrupted = CorruptedSource(OracleSource(), condition="correct", noise="none", noise_px=0)
     source = SnappedSource(corrupted)
-    source._segmenter = wrong
+    source._clicks._segmenter = wrong
     mask = source.mask(env, env.command)
     assert np.array_equal(mask.pixels, env.mask.pixels)
     assert mask.parameters["snap"] == "nothing like it there"
