@@ -5,6 +5,8 @@ PYTHON ?= $(shell command -v python3.12 || command -v python3 || echo python3.12
 VENV := .venv
 UV := $(VENV)/bin/uv
 RUN := $(VENV)/bin
+# What only reads the code needs no compiled simulator, so continuous integration checks style while that compiles.
+INSTALLED := $(VENV)/.installed
 READY := $(VENV)/.ready
 LOWEST := $(VENV)/lowest
 NEWEST := $(VENV)/newest
@@ -32,7 +34,7 @@ help: ## list the targets
 
 setup: $(READY) ## install everything into .venv
 
-$(READY): pyproject.toml uv.lock
+$(INSTALLED): pyproject.toml uv.lock
 	@command -v $(PYTHON) >/dev/null 2>&1 && $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] < (3, 12))' || { \
 	  echo "make: '$(PYTHON)' is not Python 3.12 or later."; \
 	  echo "  Debian 13: sudo apt-get install python3 python3-venv"; \
@@ -46,6 +48,9 @@ $(READY): pyproject.toml uv.lock
 	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet "uv>=0.5"
 	@UV_PROJECT_ENVIRONMENT=$(VENV) $(UV) sync --frozen --inexact --compile-bytecode
 	@$(RUN)/python -m compileall -q lerobot_excav lerobot_env_excav
+	@touch $@
+
+$(READY): $(INSTALLED)
 	@$(RUN)/lerobot-excav warmup
 	@touch $@
 
@@ -116,16 +121,16 @@ $(JUDGES)/.ready: $(READY)
 	@$(UV) pip install --quiet --python $(JUDGES)/bin/python lerobot-doctor==0.2.0 robovet==0.2.2
 	@touch $@
 
-lint: $(READY) ## check style
+lint: $(INSTALLED) ## check style
 	@$(RUN)/ruff check . && $(RUN)/ruff format --check .
 
-type: $(READY) ## check types
+type: $(INSTALLED) ## check types
 	@$(RUN)/mypy
 
-docs: $(READY) ## build the documentation into site/, every page and link checked
+docs: $(INSTALLED) ## build the documentation into site/, every page and link checked
 	@$(RUN)/mkdocs build --strict
 
-wheel: $(READY) ## build the wheel
+wheel: $(INSTALLED) ## build the wheel
 	@$(RUN)/python -m build --wheel --no-isolation
 
 clean: ## remove what the targets above made

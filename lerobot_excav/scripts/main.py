@@ -24,6 +24,7 @@ COMMANDS = {
     "audit": "ask whether a policy acts where its mask says because of the mask",
     "console": "open a page to see, point, drive, let a policy work, and record",
     "testbed-emulator": "stand in for a real excavator: a simulated machine behind the test bed's wire",
+    "testbed-stop": "stop the machine behind that wire at once, whoever drives it",
     "export": "write a small copy of a trained policy, with a model card",
     "bench": "measure how fast this machine simulates and records",
     "warmup": "compile the simulation ahead of the first episode",

@@ -21,6 +21,14 @@ class AlwaysHeld:
         return True
 
 
+class NeverHeld:
+    """Nobody lets the machine move; for who only stops it."""
+
+    def is_held(self) -> bool:
+        """Return false."""
+        return False
+
+
 class GamepadButton:
     """A button of a gamepad or joystick.
 

@@ -160,7 +160,7 @@ class HostLink:
         return self._offset
 
     @property
-    def _way_us(self) -> int:
+    def way_us(self) -> int:
         """How long a command is under way [us]: the machine cannot know it, for its clock is another."""
         return self._offset.trip_us // 2 if self._offset.is_known else 0
 
@@ -196,7 +196,7 @@ class HostLink:
         if self._dead_man.is_held() and not self._lets_go:
             flags |= CommandFlag.DEAD_MAN
         self._number += 1
-        age_us = 0 if axes == STILL else age_us + self._way_us  # to stand still is never too old
+        age_us = 0 if axes == STILL else age_us + self.way_us  # to stand still is never too old
         told = Command(
             session=self._session, number=self._number, host_us=now_us, axes=axes, age_us=age_us, flags=flags
         )

@@ -323,6 +323,11 @@ DEMOS = {
 WORK = {"workers": whole(0, 1024)}
 RESUMABLE = {**WORK, "resume": flag}
 PAGE = {"host": text, "port": whole(0, 65535), "height": whole(96, 1440), "width": whole(128, 1920)}
+ADDRESSES = ("127.0.0.1:47500", "127.9.9.9:1")  # of this computer, or somebody has to hold the dead-man
+ELSEWHERE = "10.0.0.7:47500"
+NO_ADDRESSES = ("", "machine", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:²", "::1:9")
+OWN_ADDRESS = Rule(lambda v: isinstance(v, str) and v in ADDRESSES, (*ADDRESSES, ELSEWHERE, *NO_ADDRESSES))
+ANY_ADDRESS = Rule(lambda v: isinstance(v, str) and v in (*ADDRESSES, ELSEWHERE), OWN_ADDRESS.examples)
 COMMAND_TABLES = {
     "demos": {**DEMOS, **RESUMABLE, "out": optional(path)},
     "operator": {**SCENES, **RESUMABLE, "metrics": optional(path)},
@@ -401,6 +406,7 @@ COMMAND_TABLES = {
         **dict.fromkeys(("delay_ms", "jitter_ms"), number(0, 10_000)),
         "metrics": optional(path),
     },
+    "testbed-stop": {"address": ANY_ADDRESS},
     "export": {
         **dict.fromkeys(("checkpoint", "out", "results"), optional(path)),
         **dict.fromkeys(("title", "license"), text),
@@ -427,8 +433,6 @@ SOIL_TABLE = {
 }
 
 cameras = Rule(lambda v: isinstance(v, dict) and not v, ({},))  # LeRobot's own; those of this package check themselves
-ADDRESSES = ("127.0.0.1:47500", "127.9.9.9:1")  # of this computer, or somebody has to hold the dead-man
-NO_ADDRESSES = ("", "machine", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:²", "10.0.0.7:47500", "::1:9")
 
 CONFIGURATIONS = {
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
@@ -444,7 +448,7 @@ CONFIGURATIONS = {
         ExcavatorTestbedConfig,
         {
             "cameras": cameras,
-            "address": Rule(lambda v: isinstance(v, str) and v in ADDRESSES, (*ADDRESSES, *NO_ADDRESSES)),
+            "address": OWN_ADDRESS,
             "dead_man": one_of("always", "gamepad"),
             **dict.fromkeys(("dead_man_device", "dead_man_button"), whole(0, 255)),
             **{"speed_limit": number(high=1, above=0), "ready_timeout_s": number(high=3600, above=0)},

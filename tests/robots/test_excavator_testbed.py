@@ -2,8 +2,10 @@
 
 import json
 import logging
+import re
 import signal
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from lerobot_excav.robots.excavator_testbed.alignment import Ages, AlignmentLog
 from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
 from lerobot_excav.robots.excavator_testbed.excavator_testbed import ExcavatorTestbed
 from lerobot_excav.testbed.faulty_wire import WireFaults
+from lerobot_excav.testbed.protocol import Refusal
 
 from ..testbed.conftest import emulated, until
 
@@ -120,6 +123,22 @@ def test_ages_are_those_of_the_wire(robot):
             ages = arm._ages()
         assert 55.0 < ages.state_ms < 400.0
         assert 0.0 <= ages.image_ms < 400.0
+
+
+@pytest.mark.parametrize(("delay_ms", "warnings"), [(0.0, 0), (100.0, 1)])
+def test_a_wire_that_lets_every_command_lapse_within_its_frame_is_told_once(robot, caplog, delay_ms, warnings):
+    with emulated(SIZE, wire=WireFaults(delay_ms=delay_ms)) as served:
+        arm = robot(served, cameras={})
+        arm.connect()
+        refusals = set()
+        for _ in range(30):
+            refusals.add(arm.get_observation()["swing.pos"] and arm._heard.state.refusal)
+            arm.send_action(LEFT)
+            time.sleep(0.1)
+    told = [record.message for record in caplog.records if "stands still for a part of every frame" in record.message]
+    assert len(told) == warnings
+    assert (Refusal.STALE in refusals) == bool(warnings)
+    assert all(re.search(r"is 1\d\d ms under way", words) for words in told)
 
 
 def test_frames_whose_pictures_or_state_are_too_old_are_marked(tmp_path):

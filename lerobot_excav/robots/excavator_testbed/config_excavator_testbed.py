@@ -1,14 +1,14 @@
 """Configuration of `--robot.type=excavator_testbed`."""
 
-import ipaddress
 from dataclasses import dataclass
 from pathlib import Path
 
 from lerobot.cameras import CameraConfig
 from lerobot.robots import RobotConfig
 
-from lerobot_excav.errors import ConfigurationError, require, shown
+from lerobot_excav.errors import require, shown
 from lerobot_excav.setting import check_settings, setting
+from lerobot_excav.testbed.address import USUAL_ADDRESS, host_and_port, is_loopback
 
 DEAD_MEN = ("always", "gamepad")
 
@@ -22,7 +22,7 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
         ConfigurationError: A field has a value that cannot be used.
     """
 
-    address: str = setting("Address and port of the machine's datagrams", default="127.0.0.1:47500")
+    address: str = setting("Address and port of the machine's datagrams", default=USUAL_ADDRESS)
     cameras: dict[str, CameraConfig] = setting(
         "Cameras of LeRobot by the names that policies know: main, cab and target_mask", default_factory=dict
     )
@@ -75,21 +75,4 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
         Raises:
             ConfigurationError: It is not an IPv4 address and a port.
         """
-        host, _, port = self.address.rpartition(":")
-        try:
-            return str(ipaddress.IPv4Address(host)), _checked_port(port)
-        except ValueError as error:
-            raise ConfigurationError(
-                f"robot.address={self.address!r} is not an address and a port, such as 192.168.1.20:47500"
-            ) from error
-
-
-def is_loopback(host: str) -> bool:
-    """Tell whether an address is this computer's own."""
-    return ipaddress.IPv4Address(host).is_loopback
-
-
-def _checked_port(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 65535):
-        raise ValueError
-    return int(text)
+        return host_and_port(self.address, "robot.address")

@@ -14,6 +14,7 @@ from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, STATE_N
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_testbed.alignment import Ages, AlignmentLog
 from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
+from lerobot_excav.robots.excavator_testbed.held_commands import HeldCommands
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import default_path
 from lerobot_excav.robots.simulated_robot import command_from_action
@@ -54,6 +55,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         self._taken_us: list[int] = []  # when what was observed last was taken
         path = config.alignment_log or default_path(f"{self.name}_alignment", datetime.now())
         self._log = AlignmentLog(path)
+        self._held = HeldCommands()
         self._phases = RecordingPhases(
             on_episode=self._log.begin, on_pause=self._log.end, on_discard=self._log.end, on_stop=self._log.end
         )
@@ -102,7 +104,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             self._wait_until_ready(link)
             for camera in self.cameras.values():
                 camera.connect()
-            self._heard = link.heard()
+            self._heard, self._held = link.heard(), HeldCommands()
         except BaseException:
             self._close()
             raise
@@ -159,6 +161,8 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         link.let_go(lets_go=not is_ready and self.config.dead_man == "always")
         swing, boom, arm, bucket = map(float, told) if is_ready else STILL
         link.give((swing, boom, arm, bucket))
+        if is_ready:
+            self._held.note(time.monotonic(), 1e-6 * link.way_us)
         is_as_told = refusal is Refusal.NONE and bool((np.abs(wanted - (swing, boom, arm, bucket)) < 1e-6).all())
         self._log.note(self._ages(), refusal.name, is_as_told=is_as_told)
         return dict(zip(ACTION_NAMES, (swing, boom, arm, bucket), strict=True))
