@@ -35,7 +35,7 @@ def captioned(picture: NDArray[np.uint8], caption: Caption) -> NDArray[np.uint8]
     """Return a picture (H, W, 3) with a caption over its lowest rows: words from the left, the outcome at the right."""
     height, width = picture.shape[:2]
     bar = bar_height_px(height)
-    font = _font(max(8.0, _FONT_SHARE * bar))
+    font = words_font(max(8.0, _FONT_SHARE * bar))
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image, "RGBA")
     draw.rectangle((0, height - bar, width, height), fill=_BAR_RGBA)
@@ -60,7 +60,8 @@ def bar_height_px(height: int) -> int:
 
 
 @cache
-def _font(size: float) -> ImageFont.FreeTypeFont:
+def words_font(size: float) -> ImageFont.FreeTypeFont:
+    """Return the font of words in pictures, in a size [px]."""
     font = ImageFont.load_default(size)
     assert isinstance(font, ImageFont.FreeTypeFont)  # Pillow's wheels have FreeType
     return font

@@ -148,6 +148,13 @@ class EpisodeRecord(BaseModel):
         """Whether the machine did what the shown mask said, which was not the command; None if no field tells."""
         return None
 
+    @property
+    def outcome_words(self) -> str:
+        """How the episode ended, in a few words."""
+        if self.is_success:
+            return "success"
+        return "did what the wrong mask said" if self.obeyed_shown_mask else "failure"
+
 
 class Kind(Enum):
     """How a column sums up episodes."""

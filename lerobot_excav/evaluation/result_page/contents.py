@@ -82,6 +82,7 @@ class Clips(_Table):
     """Episodes of one evaluation, side by side in the video grid."""
 
     label: Name  # of its metrics
+    folder: NamedFolder | None = None  # where `lerobot-eval` left the videos; left out: beside the metrics
     episodes: tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...]
 
 

@@ -12,7 +12,7 @@ from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
-from lerobot_excav.evaluation.result_page.video_grid import grid_clips, present_clips, write_grid
+from lerobot_excav.evaluation.result_page.video_grid import grid_rows, present_clips, write_grid
 from lerobot_excav.whole_file import write_whole
 
 METRICS = "metrics"
@@ -61,7 +61,7 @@ def _keep_metrics(page: ResultPage, stage: Path, folder: Path) -> set[str]:
 
 
 def _pictures(page: ResultPage, folder: Path) -> list[str]:
-    clips = grid_clips(page)
+    clips = grid_rows(page)
     if page.curves:
         plot_curves(page.curves, folder / CURVE_PLOT)
     if clips:

@@ -1,4 +1,7 @@
-"""Rollouts side by side: the videos of `lerobot-eval`, in which the target is marked, as tiles of one small video."""
+"""Rollouts side by side: the videos of `lerobot-eval`, in which the target is marked, as tiles of one small video.
+
+Words say which row of the page a row of tiles is, and how each episode ended.
+"""
 
 import logging
 import math
@@ -16,6 +19,7 @@ from lerobot_excav.envs.tasks.measures import EpisodeRecord
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import PageRow, ResultPage
+from lerobot_excav.evaluation.result_page.words import strip
 from lerobot_excav.evaluation.video import Image, read_video, write_video
 
 logger = logging.getLogger(__name__)
@@ -39,14 +43,28 @@ class Clip:
     episode: EpisodeRecord
 
 
-def grid_clips(page: ResultPage) -> list[list[Clip]]:
+@dataclass(frozen=True, kw_only=True)
+class GridRow:
+    """Tiles beside each other, and what they are of."""
+
+    about: str
+    clips: Sequence[Clip]
+
+
+def grid_rows(page: ResultPage) -> list[GridRow]:
     """Return the clips of a page whose videos are there, row by row.
 
     Raises:
         DatasetError: A video is of an episode that was not played.
     """
     rows = {row.row.label: row for row in page.rows}
-    return [[_clip(rows[clips.label], n) for n in clips.episodes] for clips in present_clips(page)]
+    return [
+        GridRow(
+            about=rows[clips.label].row.about,
+            clips=[_clip(rows[clips.label], clips, number) for number in clips.episodes],
+        )
+        for clips in present_clips(page)
+    ]
 
 
 def present_clips(page: ResultPage) -> list[Clips]:
@@ -54,7 +72,7 @@ def present_clips(page: ResultPage) -> list[Clips]:
     rows = {row.row.label: row for row in page.rows}
     present = [
         clips.model_copy(
-            update={"episodes": tuple(n for n in clips.episodes if _video(rows[clips.label], n).is_file())}
+            update={"episodes": tuple(n for n in clips.episodes if _video(rows[clips.label], clips, n).is_file())}
         )
         for clips in page.contents.clips
         if clips.label in rows
@@ -62,13 +80,13 @@ def present_clips(page: ResultPage) -> list[Clips]:
     return [clips for clips in present if clips.episodes]
 
 
-def _video(row: PageRow, number: int) -> Path:
-    """Return the video of an episode where `lerobot-eval --output_dir=FOLDER` leaves it, beside the metrics."""
-    folder = row.run.first.path.parent
+def _video(row: PageRow, clips: Clips, number: int) -> Path:
+    """Return the video of an episode where `lerobot-eval --output_dir=FOLDER` leaves it."""
+    folder = row.run.first.path.parent if clips.folder is None else Path(clips.folder)
     return next(iter(sorted(folder.glob(f"videos/*/eval_episode_{number}.mp4"))), folder / "none")
 
 
-def _clip(row: PageRow, number: int) -> Clip:
+def _clip(row: PageRow, clips: Clips, number: int) -> Clip:
     # In the order in which they were played, as the videos are numbered.
     played = list(row.run.first.episodes.values())
     if number >= len(played):
@@ -76,14 +94,14 @@ def _clip(row: PageRow, number: int) -> Clip:
             f"clips of {row.row.label!r}: episode {number} was not played; {row.run.first.path} has episodes 0 to "
             f"{len(played) - 1}"
         )
-    return Clip(path=_video(row, number), episode=played[number])
+    return Clip(path=_video(row, clips, number), episode=played[number])
 
 
-def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
+def write_grid(path: Path, rows: Sequence[GridRow]) -> None:
     """Write rows of clips as one mp4, in real time, as fine as `MAX_BYTES` allows; warn if the coarsest weighs more.
 
-    Shorter clips stand still at their end. The border of a tile is green if its episode succeeded, blue if the machine
-    did what the shown mask said, which was not the command, and grey otherwise.
+    Shorter clips stand still at their end. The border of a tile and the mark before its words are green if its episode
+    succeeded, blue if the machine did what the shown mask said, which was not the command, and grey otherwise.
     """
     pictures = _grid_pictures(rows)
     for quality in _QUALITIES:
@@ -95,19 +113,38 @@ def write_grid(path: Path, rows: Sequence[Sequence[Clip]]) -> None:
     )
 
 
-def _grid_pictures(rows: Sequence[Sequence[Clip]]) -> list[Image]:
-    tiles = [[_tiles(clip) for clip in row] for row in rows]
+def _grid_pictures(rows: Sequence[GridRow]) -> list[Image]:
+    tiles = [[_tiles(clip) for clip in row.clips] for row in rows]
     length = max(len(clip) for row in tiles for clip in row)
     width = max(sum(clip[0].shape[1] for clip in row) for row in tiles)
+    words = [(strip(row.about, width), _outcomes(row.clips, clips)) for row, clips in zip(rows, tiles, strict=True)]
     return [
-        np.concatenate([_band([clip[min(i, len(clip) - 1)] for clip in row], width) for row in tiles])
+        np.concatenate(
+            [
+                part
+                for (about, outcomes), clips in zip(words, tiles, strict=True)
+                for part in (
+                    about,
+                    _band([clip[min(i, len(clip) - 1)] for clip in clips], width),
+                    _band(outcomes, width),
+                )
+            ]
+        )
         for i in range(length)
     ]
 
 
-def _band(tiles: Sequence[Image], width: int) -> Image:
-    """Put tiles beside each other, and black to their right."""
-    band = np.concatenate(tiles, axis=1)
+def _outcomes(clips: Sequence[Clip], tiles: Sequence[Sequence[Image]]) -> list[Image]:
+    """Return the strips below tiles."""
+    return [
+        strip(clip.episode.outcome_words, pictures[0].shape[1], colour=_border_rgb(clip.episode))
+        for clip, pictures in zip(clips, tiles, strict=True)
+    ]
+
+
+def _band(pictures: Sequence[Image], width: int) -> Image:
+    """Put pictures beside each other, and black to their right."""
+    band = np.concatenate(pictures, axis=1)
     return np.pad(band, ((0, 0), (0, width - band.shape[1]), (0, 0)))
 
 

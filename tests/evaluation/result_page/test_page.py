@@ -76,10 +76,21 @@ def test_the_page_is_written_with_data_plot_video_and_metrics(out):
 
 def test_a_missing_video_leaves_a_tile_out(finished, tmp_path):
     (tmp_path / "test/paired/videos/fr5_grasp_0/eval_episode_0.mp4").unlink()
-    ((clip,),) = video_grid.grid_clips(make_page(finished))
+    (row,) = video_grid.grid_rows(make_page(finished))
+    (clip,) = row.clips
     assert clip.path.name == "eval_episode_1.mp4"
     write_page(make_page(finished), tmp_path / "results")
     assert "- `paired`, episodes 1\n" in (tmp_path / "results" / "report.md").read_text()
+
+
+def test_videos_may_lie_elsewhere(finished, tmp_path):
+    shutil.move(tmp_path / "test/paired/videos", tmp_path / "films/videos")
+    assert not video_grid.grid_rows(make_page(finished))
+    (clips,) = finished.clips
+    elsewhere = clips.model_copy(update={"folder": str(tmp_path / "films")})
+    (row,) = video_grid.grid_rows(make_page(finished.model_copy(update={"clips": (elsewhere,)})))
+    assert [clip.path.name for clip in row.clips] == [f"eval_episode_{number}.mp4" for number in clips.episodes]
+    assert all(clip.path.is_relative_to(tmp_path / "films") for clip in row.clips)
 
 
 def test_a_page_can_be_made_again_from_its_copies(out, again):

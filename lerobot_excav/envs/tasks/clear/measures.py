@@ -86,6 +86,12 @@ class ClearRecord(EpisodeRecord):
         return 100.0 * self.pile_removed
 
     @property
+    @override
+    def outcome_words(self) -> str:
+        """Share of the pile that is gone."""
+        return f"{self.pile_removed_percent:.0f} % removed"
+
+    @property
     def target_success_percent(self) -> float:
         """Part of the cycles in which loading began inside the commanded region [%]."""
         return self._percent(cycle.target_success for cycle in self.cycles)
