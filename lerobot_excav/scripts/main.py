@@ -76,7 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     command = module_of(name)
     try:
-        load_plugins()
+        if getattr(command, "NEEDS_PLUGINS", True):
+            load_plugins()
         parsed = parse_arguments(command.ARGUMENTS, rest, command=name, description=command.__doc__ or "")
         return int(command.run(parsed))
     except ExcavError as error:

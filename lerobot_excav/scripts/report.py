@@ -41,6 +41,7 @@ class ReportArguments(Arguments):
     metrics: list[str] = setting("[LABEL=]FILE or folder, any number", default_factory=list)
     rows: Path | None = setting("TOML file of a page, in place of METRICS", default=None)
     metrics_folder: Path | None = setting("With --rows: folder of the metrics in place of the file's", default=None)
+    videos_folder: Path | None = setting("With --rows: folder of the videos in place of the file's", default=None)
     operator: Path | None = setting("Metrics file of an operator on the same scenes", default=None)
     out: Path | None = setting(
         "Folder for report.md, report.json and figures; replaces nothing but earlier reports", default=None
@@ -60,7 +61,9 @@ def run(arguments: ReportArguments) -> int:
     )
     if arguments.rows is not None:
         return _page(arguments)
-    require(arguments.metrics_folder is None, f"--metrics_folder={arguments.metrics_folder} is of use with --rows only")
+    for name in ("metrics_folder", "videos_folder"):
+        folder = getattr(arguments, name)
+        require(folder is None, f"--{name}={folder} is of use with --rows only")
     operator = None
     if arguments.operator is not None:
         operator = Run(label="operator", evaluations=(read_evaluation(arguments.operator),))
@@ -82,7 +85,10 @@ def _page(arguments: ReportArguments) -> int:
 
     require(arguments.operator is None, "--operator is of use with metrics files only; give it a row of the page")
     assert arguments.rows is not None
-    page = make_page(read_contents(arguments.rows, metrics=arguments.metrics_folder), seed=arguments.seed)
+    page = make_page(
+        read_contents(arguments.rows, metrics=arguments.metrics_folder, videos=arguments.videos_folder),
+        seed=arguments.seed,
+    )
     if arguments.out is None:
         print(page_text(page))
         return 0

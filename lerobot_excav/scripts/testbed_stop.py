@@ -4,7 +4,7 @@ Sends the emergency stop of the protocol until the machine says that it is latch
 whatever another program tells it. `--robot.release_stop=true` releases it when a robot connects the next time.
 
 Keep a terminal ready with this command while a policy drives. It comes beside the stop that is wired to the machine,
-never in its place: a network can fail.
+never in its place: a network can fail. Then this command says so every three seconds, and tries on until Ctrl-C.
 
 Examples:
   lerobot-excav testbed-stop
@@ -12,6 +12,8 @@ Examples:
   lerobot-excav testbed-stop --address=192.168.1.20:47500
 """
 
+import contextlib
+import sys
 import time
 from dataclasses import dataclass
 
@@ -24,8 +26,10 @@ from lerobot_excav.testbed.host_link import HostLink
 from lerobot_excav.testbed.protocol import StateFlag
 from lerobot_excav.testbed.safety import STALE_S
 
+NEEDS_PLUGINS = False  # a stop does not wait for other packages, nor fails with them
+
 PATIENCE_S = 3.0
-"""How long the machine may take to answer [s] (kind: guess: 150 datagrams)."""
+"""How long the machine may take to answer before that is told [s] (kind: guess: 150 datagrams)."""
 
 
 @dataclass(kw_only=True)
@@ -40,35 +44,36 @@ class TestbedStopArguments(Arguments):
 
 
 def run(arguments: TestbedStopArguments) -> int:
-    """Send the stop until it is latched.
-
-    Raises:
-        DeviceError: The machine did not say so.
-    """
-    link = HostLink(host_and_port(arguments.address, "--address"), dead_man=NeverHeld(), hold_s=STALE_S)
-    link.stop()  # before the first datagram: none of this program may say anything else
-    link.connect()
-    try:
-        _wait_until_latched(link, arguments.address)
-    finally:
-        link.close()
+    """Send the stop until it is latched."""
+    while (why := _attempt(arguments.address)) is not None:
+        print(
+            f"THE MACHINE at {arguments.address} DOES NOT SAY THAT IT IS STOPPED ({why}). Use the stop that is wired "
+            "to it. Trying on; Ctrl-C ends this.",
+            file=sys.stderr,
+            flush=True,
+        )
     print(f"the machine at {arguments.address} is stopped, and stays so until --robot.release_stop=true releases it")
     return 0
 
 
-def _wait_until_latched(link: HostLink, address: str) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
+def _attempt(address: str) -> str | None:
+    """Send stops for `PATIENCE_S`, as a host of its own; return why the machine is not known to be stopped, or None."""
+    link = HostLink(host_and_port(address, "--address"), dead_man=NeverHeld(), hold_s=STALE_S)
+    link.stop()  # before the first datagram: none of this program may say anything else
+    deadline, why = time.monotonic() + PATIENCE_S, "it is not heard"
+    with contextlib.closing(link):
         try:
-            if link.heard().state.flags & StateFlag.STOP_LATCHED:
-                return
-        except DeviceError:  # not heard yet
-            pass
-        time.sleep(0.02)
-    raise DeviceError(
-        f"the machine at {address} did not say within {PATIENCE_S:.0f} s that it is stopped. Use the stop that is "
-        "wired to it; then check the address and the cable."
-    )
+            link.connect()
+        except DeviceError as error:  # no way there; perhaps a cable is out
+            time.sleep(PATIENCE_S)
+            return str(error.__cause__ or error)
+        while time.monotonic() < deadline:
+            time.sleep(0.02)
+            with contextlib.suppress(DeviceError):  # not heard yet
+                if link.heard().state.flags & StateFlag.STOP_LATCHED:
+                    return None
+                why = "it answers, and the stop is not latched"
+    return why
 
 
 ARGUMENTS = TestbedStopArguments

@@ -20,7 +20,7 @@ from lerobot_excav.errors import ConfigurationError, DeviceError
 from lerobot_excav.testbed.faulty_wire import FaultyWire, WireFaults
 from lerobot_excav.testbed.picture_stream import PictureServer
 from lerobot_excav.testbed.protocol import RATE_HZ, REFUSAL_WORDS, Command, DatagramError, Refusal, State, StateFlag
-from lerobot_excav.testbed.safety import SOAK_S, Limits, SafetyGate, Verdict
+from lerobot_excav.testbed.safety import SOAK_S, WATCHDOG_S, Limits, SafetyGate, Verdict
 from lerobot_excav.testbed.valves import Valves
 
 logger = logging.getLogger(__name__)
@@ -115,7 +115,7 @@ class Emulator:
         self._incoming: FaultyWire[tuple[bytes, tuple[str, int]]] = FaultyWire(machine.wire, wire_in)
         self._outgoing: FaultyWire[bytes] = FaultyWire(machine.wire, wire_out)
         self._session, self._number, self._ticks = 1 + secrets.randbelow(65535), 0, 0
-        self._host: tuple[str, int] | None = None
+        self._hosts: dict[tuple[str, int], float] = {}  # who was heard, and when
         self._came_us, self._refusal = 0, Refusal.NOT_HEARD
         self._joint_pos, self._joint_vel = self._joints()
         self._start_s = time.monotonic()
@@ -144,7 +144,7 @@ class Emulator:
         if self._ticks % round(RATE_HZ / self._machine.pictures_hz) == 0:
             self._show()
         self._ticks += 1
-        self._answer(now_s)
+        self._answer(time.monotonic())  # a state that took long to reach is not under way for that time
 
     def close(self) -> None:
         """Switch it off."""
@@ -195,7 +195,9 @@ class Emulator:
         for data, sender in self._incoming.take(now_s):
             with contextlib.suppress(DatagramError):
                 if self.gate.hear(Command.decode(data), now_s):
-                    self._host, self._came_us = sender, self.clock_us  # a stranger's nonsense gets no answer
+                    self._came_us = self.clock_us
+                    self._hosts[sender] = now_s  # a stranger's nonsense gets no answer
+        self._hosts = {host: heard_s for host, heard_s in self._hosts.items() if now_s - heard_s <= WATCHDOG_S}
 
     def _show(self) -> None:
         taken_us = self.clock_us
@@ -206,9 +208,9 @@ class Emulator:
         self._number += 1
         self._outgoing.put(self._state(now_s).encode(), now_s)
         for data in self._outgoing.take(now_s):
-            if self._host is not None:
+            for host in self._hosts:
                 with contextlib.suppress(OSError):
-                    self._socket.sendto(data, self._host)
+                    self._socket.sendto(data, host)
 
     def _state(self, now_s: float) -> State:
         flags = StateFlag.ARMED if self.gate.is_armed else StateFlag.NONE

@@ -198,21 +198,36 @@ class State:
         )
 
 
+MOST_SESSIONS = 8
+"""Sessions that are told apart at the same time (kind: guess: hosts, and those that were started again)."""
+
+
 class Newest:
-    """Lets datagrams through whose number has not been seen or overtaken; a new session begins from the start."""
+    """Lets datagrams through whose number has not been seen or overtaken; a new session begins from the start.
+
+    Sessions may alternate, as those of two hosts do.
+
+    Attributes:
+        session: Of the last datagram that was let through; 0 before the first.
+    """
 
     def __init__(self) -> None:
-        self.session, self.number = 0, 0
+        self.session = 0
+        self._numbers: dict[int, int] = {}  # of each session, the one that was heard last at the end
 
     def is_news(self, session: int, number: int) -> bool:
         """Tell whether a datagram is newer than all before, and take note of it.
 
         Duplicates and those that were overtaken on the way are not. Numbers do not wrap: at 50 Hz they last 2.7 years.
         """
-        if session == self.session and number <= self.number:
-            return False
-        self.session, self.number = session, number
-        return True
+        newest = self._numbers.pop(session, None)
+        is_news = newest is None or number > newest
+        self._numbers[session] = number if newest is None or is_news else newest
+        while len(self._numbers) > MOST_SESSIONS:
+            del self._numbers[next(iter(self._numbers))]
+        if is_news:
+            self.session = session
+        return is_news
 
 
 def _sealed(data: bytes) -> bytes:

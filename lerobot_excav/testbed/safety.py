@@ -97,7 +97,7 @@ class SafetyGate:
     _soaked_s: float = 0.0
     _lag: "ShortestLag" = field(default_factory=lambda: ShortestLag())
     _late_s: float = 0.0
-    _is_release_new: bool = False
+    _may_release: set[int] = field(default_factory=set)
     _refusal: Refusal = Refusal.NOT_HEARD
 
     def hear(self, command: Command, now_s: float) -> bool:
@@ -110,25 +110,30 @@ class SafetyGate:
         if is_other or now_s - self._heard_s > WATCHDOG_S:
             self._disarm()
         self._late_s = self._lag.beyond_s(now_s - command.host_us * 1e-6, now_s)
-        was_release = bool(self.command and self.command.flags & CommandFlag.RELEASE) and not is_other
         self.command, self._heard_s = command, now_s
         is_neutral = max(map(abs, command.axes)) <= CENTRED and not command.flags & CommandFlag.DEAD_MAN
         self._neutral = self._neutral + 1 if is_neutral else 0
         if not (is_neutral or self._is_soaked):
             self._soaked_s = 0.0
-        self._latch(command, is_neutral=is_neutral, was_release=was_release)
+        self._latch(command, is_neutral=is_neutral)
         return True
 
-    def _latch(self, command: Command, *, is_neutral: bool, was_release: bool) -> None:
-        """Latch the emergency stop, or release it: one that was asked for before the stop does not count."""
-        is_release = bool(command.flags & CommandFlag.RELEASE)
-        if command.flags & CommandFlag.EMERGENCY_STOP:
-            self.is_stopped, self._is_release_new = True, False
+    def _latch(self, command: Command, *, is_neutral: bool) -> None:
+        """Latch the emergency stop, or release it.
+
+        A release counts only from a session that has been heard without that wish since the stop: one that was asked
+        for before it does not, whoever gave the stop.
+        """
+        is_stop, is_release = (bool(command.flags & flag) for flag in (CommandFlag.EMERGENCY_STOP, CommandFlag.RELEASE))
+        if is_stop:
+            self.is_stopped = True
+            self._may_release.clear()
             self._disarm()
-            return
-        self._is_release_new = is_release and (self._is_release_new or not was_release)
-        if self._is_release_new and is_neutral:
+        if self.is_stopped and not is_release:
+            self._may_release.add(command.session)
+        elif self.is_stopped and not is_stop and is_neutral and command.session in self._may_release:
             self.is_stopped = False
+            self._may_release.clear()
 
     def is_heard(self, now_s: float) -> bool:
         """Tell whether the host was heard lately."""

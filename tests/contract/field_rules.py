@@ -363,7 +363,7 @@ COMMAND_TABLES = {
     },
     "report": {
         "metrics": each(text),
-        **dict.fromkeys(("rows", "metrics_folder", "operator", "out"), optional(path)),
+        **dict.fromkeys(("rows", "metrics_folder", "videos_folder", "operator", "out"), optional(path)),
         "seed": whole(0),
     },
     "audit": {

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.slow
 ROWS = {
     "title": "Does it obey?",
     "metrics": "METRICS",
+    "videos": "METRICS",
     "section": [
         {
             "title": "A table",

@@ -108,6 +108,7 @@ def test_a_page_is_written_and_made_again_from_its_metrics(rows, tmp_path, capsy
         ([], "give either metrics files or --rows"),
         (["a.jsonl", "--rows=r.toml"], "give either metrics files or --rows"),
         (["a.jsonl", "--metrics_folder=m"], "--metrics_folder=m is of use with --rows only"),
+        (["a.jsonl", "--videos_folder=m"], "--videos_folder=m is of use with --rows only"),
         (["--rows=r.toml", "--operator=o"], "--operator is of use with metrics files only"),
     ],
 )

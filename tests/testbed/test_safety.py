@@ -145,6 +145,35 @@ def test_a_release_that_was_asked_for_before_the_stop_does_not_release_it():
     assert wire.tick(flags=RELEASE).refusal is not Refusal.EMERGENCY_STOP
 
 
+def test_of_two_hosts_one_may_stop_and_a_wish_of_the_other_from_before_releases_nothing():
+    wire = Wire().armed()
+    driver, numbers = wire.session, {wire.session: wire.number, 77: 0}
+
+    def say(session, *what):
+        wire.session, wire.number = session, numbers[session]
+        verdict = wire.tick(*what)
+        numbers[session] = wire.number
+        return verdict.refusal
+
+    say(driver, STILL, RELEASE)  # nothing is latched; the wish stays
+    for _ in range(20):
+        assert say(77, STILL, STOP) is Refusal.EMERGENCY_STOP
+        assert say(driver, STILL, RELEASE) is Refusal.EMERGENCY_STOP
+    assert say(driver, FULL, HELD) is Refusal.EMERGENCY_STOP
+    assert say(driver, STILL, RELEASE) is Refusal.START_GATE  # a wish from after the stop does
+
+
+def test_a_datagram_that_was_overtaken_does_not_pass_because_another_host_spoke():
+    wire = Wire().armed()
+    driver, late = wire.session, wire.number + 1
+    wire.number += 5
+    wire.tick()
+    wire.session, wire.number = 77, 0
+    wire.tick(flags=STOP)
+    wire.session, wire.number = driver, late - 1
+    assert not wire.send(STILL, RELEASE)
+
+
 @pytest.mark.parametrize(("late_s", "moves"), [(0.1, True), (0.2, False), (2.0, False)])
 def test_a_command_that_was_under_way_for_longer_than_others_is_stale(late_s, moves):
     wire = Wire().armed()
@@ -224,17 +253,35 @@ def test_every_change_of_the_reason_is_logged_once():
 
 
 STEPS = st.tuples(
-    st.sampled_from([FULL, (0.0,) * 4]), st.integers(0, 7), st.sampled_from([0, 0, 200_000]), st.booleans()
+    st.sampled_from([FULL, (0.0,) * 4]),
+    st.integers(0, 7),
+    st.sampled_from([0, 0, 200_000]),
+    st.booleans(),
+    st.sampled_from([0, 0, 0, 1]),
 )
 
 
 @given(st.lists(STEPS, max_size=60))
 def test_whatever_comes_it_moves_only_when_armed_held_fresh_and_not_stopped(steps):
+    """Two hosts speak; a stop lasts until one says release that was heard without that word since."""
     wire, silent_s = Wire().armed(), 0.0
-    for axes, flags, age_us, is_sent in steps:
-        verdict = wire.tick(axes, CommandFlag(flags), age_us=age_us, is_sent=is_sent)
+    sessions, numbers = (wire.session, 77), {wire.session: wire.number, 77: 0}
+    is_stopped, may_release = False, set()
+    for axes, number, age_us, is_sent, host in steps:
+        flags, session = CommandFlag(number), sessions[host]
+        wire.session, wire.number = session, numbers[session]
+        verdict = wire.tick(axes, flags, age_us=age_us, is_sent=is_sent)
+        numbers[session] = wire.number
         silent_s = 0.0 if is_sent else silent_s + TICK_S
+        if is_sent and flags & STOP:
+            is_stopped, may_release = True, set()
+        if is_sent and not flags & RELEASE:
+            may_release.add(session)
+        elif is_sent and not flags & STOP and session in may_release:
+            is_stopped = is_stopped and (any(axes) or bool(flags & HELD))
+        assert wire.gate.is_stopped == is_stopped
         if any(verdict.axes):
+            assert not is_stopped
             assert silent_s + 1e-6 * wire.gate.command.age_us <= STALE_S + 1e-9
             assert wire.gate.is_armed
             assert not wire.gate.is_stopped

@@ -82,7 +82,6 @@ class Clips(_Table):
     """Episodes of one evaluation, side by side in the video grid."""
 
     label: Name  # of its metrics
-    folder: NamedFolder | None = None  # where `lerobot-eval` left the videos; left out: beside the metrics
     episodes: tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...]
 
 
@@ -91,6 +90,7 @@ class Contents(_Table):
 
     title: Text
     metrics: Folder  # of the metrics files
+    videos: Folder | None = None  # of the videos, NAME/videos for an evaluation; left out: beside its metrics
     section: tuple[Section, ...] = ()
     text: str = ""  # what is to be known before
     curve: tuple[CurveSource, ...] = ()  # success against training
@@ -127,11 +127,12 @@ class Contents(_Table):
         return self
 
 
-def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
+def read_contents(path: Path, *, metrics: Path | None = None, videos: Path | None = None) -> Contents:
     """Read what stands on a page from a TOML file.
 
     `metrics` is a folder of metrics files in place of the file's: one that a page has kept, with the curves in it, or
-    that of another run of the experiment, with the curves where they lie seen from the file's folder.
+    that of another run of the experiment, with the curves where they lie seen from the file's folder. `videos` is a
+    folder of videos in place of the file's.
 
     Raises:
         ConfigurationError: The file is missing or damaged, a key is unknown or missing, a value is of another type, a
@@ -146,6 +147,8 @@ def read_contents(path: Path, *, metrics: Path | None = None) -> Contents:
     # Dates have no JSON form; as text they are refused where a number is asked for.
     text = json.dumps(content, default=str)
     contents = validated(Contents, text, f"--rows={path}", error=ConfigurationError)
+    if videos is not None:
+        contents = contents.model_copy(update={"videos": str(videos)})
     return contents if metrics is None else _moved(contents, metrics)
 
 

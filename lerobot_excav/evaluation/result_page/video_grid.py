@@ -61,7 +61,7 @@ def grid_rows(page: ResultPage) -> list[GridRow]:
     return [
         GridRow(
             about=rows[clips.label].row.about,
-            clips=[_clip(rows[clips.label], clips, number) for number in clips.episodes],
+            clips=[_clip(page, rows[clips.label], number) for number in clips.episodes],
         )
         for clips in present_clips(page)
     ]
@@ -72,7 +72,7 @@ def present_clips(page: ResultPage) -> list[Clips]:
     rows = {row.row.label: row for row in page.rows}
     present = [
         clips.model_copy(
-            update={"episodes": tuple(n for n in clips.episodes if _video(rows[clips.label], clips, n).is_file())}
+            update={"episodes": tuple(n for n in clips.episodes if _video(page, rows[clips.label], n).is_file())}
         )
         for clips in page.contents.clips
         if clips.label in rows
@@ -80,13 +80,15 @@ def present_clips(page: ResultPage) -> list[Clips]:
     return [clips for clips in present if clips.episodes]
 
 
-def _video(row: PageRow, clips: Clips, number: int) -> Path:
-    """Return the video of an episode where `lerobot-eval --output_dir=FOLDER` leaves it."""
-    folder = row.run.first.path.parent if clips.folder is None else Path(clips.folder)
+def _video(page: ResultPage, row: PageRow, number: int) -> Path:
+    """Return the video of an episode of a row's first evaluation, as `lerobot-eval --output_dir=FOLDER` calls it."""
+    name, evaluation, _ = row.parts[0]
+    videos = page.contents.videos
+    folder = evaluation.path.parent if videos is None else Path(videos) / name
     return next(iter(sorted(folder.glob(f"videos/*/eval_episode_{number}.mp4"))), folder / "none")
 
 
-def _clip(row: PageRow, clips: Clips, number: int) -> Clip:
+def _clip(page: ResultPage, row: PageRow, number: int) -> Clip:
     # In the order in which they were played, as the videos are numbered.
     played = list(row.run.first.episodes.values())
     if number >= len(played):
@@ -94,7 +96,7 @@ def _clip(row: PageRow, clips: Clips, number: int) -> Clip:
             f"clips of {row.row.label!r}: episode {number} was not played; {row.run.first.path} has episodes 0 to "
             f"{len(played) - 1}"
         )
-    return Clip(path=_video(row, clips, number), episode=played[number])
+    return Clip(path=_video(page, row, number), episode=played[number])
 
 
 def write_grid(path: Path, rows: Sequence[GridRow]) -> None:

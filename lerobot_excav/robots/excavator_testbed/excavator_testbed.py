@@ -13,8 +13,8 @@ from lerobot.robots import Robot
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES, STATE_NAMES
 from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_testbed.alignment import Ages, AlignmentLog
+from lerobot_excav.robots.excavator_testbed.command_lapse import CommandLapse
 from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
-from lerobot_excav.robots.excavator_testbed.held_commands import HeldCommands
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import default_path
 from lerobot_excav.robots.simulated_robot import command_from_action
@@ -55,7 +55,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         self._taken_us: list[int] = []  # when what was observed last was taken
         path = config.alignment_log or default_path(f"{self.name}_alignment", datetime.now())
         self._log = AlignmentLog(path)
-        self._held = HeldCommands()
+        self._lapse = CommandLapse()
         self._phases = RecordingPhases(
             on_episode=self._log.begin, on_pause=self._log.end, on_discard=self._log.end, on_stop=self._log.end
         )
@@ -104,7 +104,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             self._wait_until_ready(link)
             for camera in self.cameras.values():
                 camera.connect()
-            self._heard, self._held = link.heard(), HeldCommands()
+            self._heard, self._lapse = link.heard(), CommandLapse()
         except BaseException:
             self._close()
             raise
@@ -162,7 +162,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         swing, boom, arm, bucket = map(float, told) if is_ready else STILL
         link.give((swing, boom, arm, bucket))
         if is_ready:
-            self._held.note(time.monotonic(), 1e-6 * link.way_us)
+            self._lapse.note(time.monotonic(), 1e-6 * link.way_us)
         is_as_told = refusal is Refusal.NONE and bool((np.abs(wanted - (swing, boom, arm, bucket)) < 1e-6).all())
         self._log.note(self._ages(), refusal.name, is_as_told=is_as_told)
         return dict(zip(ACTION_NAMES, (swing, boom, arm, bucket), strict=True))
@@ -189,6 +189,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         """Send zero with the dead-man let go until the machine is armed."""
         link.let_go(lets_go=self.config.dead_man == "always")
         deadline, words_s, why = time.monotonic() + self.config.ready_timeout_s, 0.0, "it is not heard"
+        was_latched = True  # a stop from before may be released, as the configuration says; a later one may not
         while time.monotonic() < deadline:
             link.give(STILL)
             time.sleep(0.02)
@@ -199,8 +200,15 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             if state.flags & StateFlag.ARMED:
                 link.let_go(lets_go=False)
                 return
-            if self.config.release_stop and state.flags & StateFlag.STOP_LATCHED:
+            is_latched = bool(state.flags & StateFlag.STOP_LATCHED)
+            if is_latched and not was_latched:
+                raise DeviceError(
+                    f"the machine at {self.config.address} was stopped while the robot waited for it. Look at it; then "
+                    "begin again with --robot.release_stop=true"
+                )
+            if is_latched and self.config.release_stop:
                 link.release()
+            was_latched = is_latched
             why = REFUSAL_WORDS[state.refusal]
             if time.monotonic() - words_s > _WORDS_EVERY_S:
                 words_s = time.monotonic()

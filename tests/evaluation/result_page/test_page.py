@@ -83,12 +83,11 @@ def test_a_missing_video_leaves_a_tile_out(finished, tmp_path):
     assert "- `paired`, episodes 1\n" in (tmp_path / "results" / "report.md").read_text()
 
 
-def test_videos_may_lie_elsewhere(finished, tmp_path):
-    shutil.move(tmp_path / "test/paired/videos", tmp_path / "films/videos")
+def test_videos_may_lie_elsewhere_by_the_name_of_their_evaluation(finished, tmp_path):
+    shutil.move(tmp_path / "test/paired/videos", tmp_path / "films/paired/videos")
     assert not video_grid.grid_rows(make_page(finished))
+    (row,) = video_grid.grid_rows(make_page(finished.model_copy(update={"videos": str(tmp_path / "films")})))
     (clips,) = finished.clips
-    elsewhere = clips.model_copy(update={"folder": str(tmp_path / "films")})
-    (row,) = video_grid.grid_rows(make_page(finished.model_copy(update={"clips": (elsewhere,)})))
     assert [clip.path.name for clip in row.clips] == [f"eval_episode_{number}.mp4" for number in clips.episodes]
     assert all(clip.path.is_relative_to(tmp_path / "films") for clip in row.clips)
 

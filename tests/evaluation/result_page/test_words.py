@@ -20,7 +20,6 @@ def test_words_are_drawn_and_other_words_otherwise():
 def test_long_words_become_smaller_before_they_are_cut():
     words = "did what the wrong mask said, twice"
     wide, narrow = strip(words, 512), strip(words, 220)
-    assert wide.any(axis=(0, 2)).all()
     inked = [np.flatnonzero((picture > 120).any(axis=(1, 2))) for picture in (wide, narrow)]
     assert np.ptp(inked[1]) < np.ptp(inked[0])
     assert (narrow[:, -3:] < 60).all()

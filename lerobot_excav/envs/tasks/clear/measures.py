@@ -89,7 +89,7 @@ class ClearRecord(EpisodeRecord):
     @override
     def outcome_words(self) -> str:
         """Share of the pile that is gone."""
-        return f"{self.pile_removed_percent:.0f} % removed"
+        return f"{round(self.pile_removed_percent)} % removed"
 
     @property
     def target_success_percent(self) -> float:

@@ -1,6 +1,6 @@
 """What is measured of Scoop-v0; `docs/reference/metrics.md` defines the measures."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, override
 
 from pydantic import NonNegativeInt
 
@@ -32,6 +32,14 @@ class ScoopRecord(EpisodeRecord):
     def has_spill(self) -> bool:
         """Whether soil was lost on the way."""
         return self.spill_before_target_events > 0
+
+    @property
+    @override
+    def outcome_words(self) -> str:
+        """Where was dug, and how much came of it."""
+        mass_kg = round(self.retained_mass_kg)
+        where = "dug in the region" if self.target_success else "dug elsewhere"
+        return f"{where}, {mass_kg} kg" if mass_kg else "brought nothing"
 
 
 def scoop_outcome(task_state: "NDArray[Any]") -> dict[str, Any]:

@@ -2,14 +2,14 @@
 
 import pytest
 
-from lerobot_excav.robots.excavator_testbed.held_commands import FRAMES, HeldCommands
+from lerobot_excav.robots.excavator_testbed.command_lapse import FRAMES, CommandLapse
 
 
 def warned_at(caplog, times_s, way_s):
     """Return after how many commands there was a warning, and how many there were."""
-    held, first = HeldCommands(), None
+    lapse, first = CommandLapse(), None
     for number, now_s in enumerate(times_s):
-        held.note(now_s, way_s)
+        lapse.note(now_s, way_s)
         first = number if first is None and caplog.records else first
     return first, len(caplog.records)
 

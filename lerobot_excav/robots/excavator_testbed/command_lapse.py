@@ -12,7 +12,7 @@ FRAMES = 10
 """Frames of which the shortest is believed: single late ones are common (kind: guess)."""
 
 
-class HeldCommands:
+class CommandLapse:
     """Warns, once, if the machine lets every command lapse before the next one reaches it.
 
     It stands still for the rest of each frame then. No rule is broken and nothing fails: it only moves less than it was
@@ -38,8 +38,9 @@ class HeldCommands:
             self._has_warned = True
             logger.warning(
                 "a command is held for %.0f ms and is %.0f ms under way; the machine takes none that is older than "
-                "%.0f ms, so it stands still for a part of every frame. Give more frames a second (--fps, or "
-                "--dataset.fps), or mend the network.",
+                "%.0f ms, so it stands still for a part of every frame. Mend the network; or, if the loop is slow, let "
+                "it do less. A person or a policy that was trained so may also drive at more frames a second (--fps, "
+                "--dataset.fps).",
                 1e3 * frame_s,
                 1e3 * way_s,
                 1e3 * STALE_S,
