@@ -24,6 +24,7 @@ from lerobot_excav.datasets.record.workers import worker_pool
 from validation.finished_plays import read_finished
 from validation.operator_delay.drive import Condition, drive
 from validation.operator_delay.page import write_page
+from validation.whole_numbers import whole_numbers
 
 FILE = Path("results", "scoop", "operator_delay.jsonl")
 PAGE = Path("docs", "explanation", "rate_and_delay.md")
@@ -38,8 +39,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--scoops", type=int, default=40, help="scoops per condition (default: 40)")
-    parser.add_argument("--rates", type=_whole, default=RATES_HZ, help="of commands [1/s] (default: 10,25,50)")
-    parser.add_argument("--delays", type=_whole, default=DELAYS_MS, help=f"[ms] (default: {DELAYS_MS})")
+    parser.add_argument("--rates", type=whole_numbers, default=RATES_HZ, help="of commands [1/s] (default: 10,25,50)")
+    parser.add_argument("--delays", type=whole_numbers, default=DELAYS_MS, help=f"[ms] (default: {DELAYS_MS})")
     parser.add_argument("--workers", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--file", type=Path, default=FILE, help=f"finished scoops (default: {FILE})")
     parser.add_argument("--page", type=Path, default=PAGE, help=f"page to write (default: {PAGE})")
@@ -51,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     if given.scoops < 1:
         _parser().error(f"--scoops={given.scoops}; allowed: 1 and above")
+    if not (given.rates and given.delays):
+        _parser().error("--rates and --delays; allowed: one number at least")
     conditions = [Condition(rate_hz=rate, delay_ms=delay) for rate in given.rates for delay in given.delays]
     wanted = [(condition, scoop) for scoop in range(given.scoops) for condition in conditions]
     given.file.parent.mkdir(parents=True, exist_ok=True)
@@ -72,13 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _key(scoop: dict[str, Any]) -> tuple[int, int, int]:
     return scoop["rate_hz"], scoop["delay_ms"], scoop["scene_id"]
-
-
-def _whole(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}; give whole numbers, as in 10,25") from None
 
 
 if __name__ == "__main__":

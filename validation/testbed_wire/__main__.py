@@ -23,6 +23,7 @@ from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from validation.finished_plays import read_finished
 from validation.rate_words import rate_words
 from validation.testbed_wire.rollout import Wire, cycles_behind, late_ticks
+from validation.whole_numbers import whole_numbers
 
 FILE = Path("results", "scoop", "testbed_wire.jsonl")
 CHECKPOINT = Path("checkpoints", "excavator_mask_act")
@@ -39,8 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--cycles", type=int, default=12, help="cycles per condition, a multiple of 4 (default: 12)")
-    parser.add_argument("--delays", type=_whole, default=DELAYS_MS, help=f"each way [ms] (default: {DELAYS_MS})")
-    parser.add_argument("--losses", type=_whole, default=LOSSES_PERCENT, help=f"[%%] (default: {LOSSES_PERCENT})")
+    parser.add_argument("--delays", type=whole_numbers, default=DELAYS_MS, help=f"each way [ms] (default: {DELAYS_MS})")
+    parser.add_argument(
+        "--losses", type=whole_numbers, default=LOSSES_PERCENT, help=f"[%%] (default: {LOSSES_PERCENT})"
+    )
     parser.add_argument("--policy", type=Path, default=CHECKPOINT, help=f"checkpoint (default: {CHECKPOINT})")
     parser.add_argument("--file", type=Path, default=FILE, help=f"finished cycles (default: {FILE})")
     given = parser.parse_args(arguments)
@@ -104,13 +107,6 @@ def table(conditions: Sequence[tuple[Wire, Sequence[dict[str, Any]]]]) -> list[s
         mass_kg = sum(cycle["retained_mass_kg"] for cycle in cycles) / n
         lines.append(f"| {wire.delay_ms} ms | {wire.loss:.0%} | {rates[0]} | {rates[1]} | {mass_kg:.0f} kg |")
     return lines
-
-
-def _whole(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(part) for part in text.split(",") if part)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}; give whole numbers, as in 0,50") from None
 
 
 if __name__ == "__main__":

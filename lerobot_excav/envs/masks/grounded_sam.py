@@ -14,12 +14,10 @@ from pydantic import Field
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.grounding import GROUNDING_DINO, Detection, Detector
 from lerobot_excav.envs.masks.model_files import ModelName, Placement
-from lerobot_excav.envs.masks.options import MaskOptions
+from lerobot_excav.envs.masks.options import MaskOptions, Share
 from lerobot_excav.envs.masks.segment_anything import SAM2, SegmentAnything
 from lerobot_excav.envs.masks.shot import reduced
 from lerobot_excav.envs.masks.source import MaskView, Pixels, TargetMask, register_mask_source
-
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class GroundedSamOptions(MaskOptions):

@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.object_pixels import object_by_colour, object_by_depth
-from lerobot_excav.envs.masks.options import ANY, MaskOptions, require_distinct
+from lerobot_excav.envs.masks.options import ANY, MaskOptions, Share, require_distinct
 from lerobot_excav.envs.masks.shot import Shot, reduced
 from lerobot_excav.envs.masks.source import MaskView, Pixels, TargetMask, register_mask_source
 from lerobot_excav.errors import ConfigurationError, require
@@ -34,7 +34,6 @@ from lerobot_excav.errors import ConfigurationError, require
 FINER = 8
 """How many times finer a polygon is drawn than the mask (kind: guess)."""
 
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Place = tuple[Share, Share]
 
 

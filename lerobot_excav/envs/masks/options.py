@@ -4,14 +4,18 @@ import hashlib
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lerobot_excav.errors import ConfigurationError, require
 
 ANY = "*"
 """Key of the entry for whatever has none of its own, in options that list entries."""
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+"""From nothing to all, as of a picture's width or of certainty."""
 
 
 class MaskOptions(BaseModel):

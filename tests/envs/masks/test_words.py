@@ -94,7 +94,9 @@ def test_logits_of_a_square_become_pixels_of_a_picture_that_is_none(weights):
     assert box == pytest.approx([32.0, 32.0, 64.0, 64.0])
 
 
-@pytest.mark.parametrize("make", [lambda **s: ExcavatorEnv(fidelity="fast", **s), FR5GraspEnv])
+@pytest.mark.parametrize(
+    "make", [pytest.param(lambda **s: ExcavatorEnv(fidelity="fast", **s), marks=pytest.mark.slow), FR5GraspEnv]
+)
 def test_the_chain_runs_in_both_machines_once_for_a_scene(make, options, monkeypatch):
     asked, find = [], Detector.find
     monkeypatch.setattr(Detector, "find", lambda self, *given: asked.append(given) or find(self, *given))

@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.command import Command
-from lerobot_excav.envs.masks.options import ANY, MaskOptions, require_distinct
+from lerobot_excav.envs.masks.options import ANY, MaskOptions, Share, require_distinct
 from lerobot_excav.envs.masks.shot import Shot, reduced
 from lerobot_excav.envs.masks.source import MaskView, TargetMask, register_mask_source
 from lerobot_excav.errors import ConfigurationError, require
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
 
 _STREAM = 0x51C3  # names the random streams of missed clicks
-
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Click(BaseModel):

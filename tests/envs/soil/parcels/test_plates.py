@@ -30,7 +30,7 @@ def test_the_nearest_point_of_a_plate_is_that_of_the_reference(point, plate):
 
 
 @given(seed=st.integers(0, 2**16), at_box=st.booleans())
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_bucket_and_box_press_parcels_as_their_polygons_do(seed, at_box):
     rng = np.random.default_rng(seed)
     tool = tool_path(rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.2, 0.5), rng.uniform(-0.05, 0.05, 3), 0.05, steps=4)
