@@ -242,3 +242,26 @@ def test_the_landed_page_is_made_of_what_lies_beside_it():
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=folder / "metrics")
     assert all(contents.metrics_paths(row) for row in contents.rows)
     assert all(list(Path(curve.folder).glob("*.jsonl")) for curve in contents.curve)
+
+
+def test_the_page_of_the_excavator_has_a_row_for_all_metrics_that_have_landed():
+    folder = ROOT / "results" / "excavator"
+    contents = read_contents(EXCAVATOR.with_name("rows.toml"), metrics=folder / "metrics")
+    landed = {path for row in contents.rows for path in contents.metrics_paths(row).values()}
+    assert landed == set((folder / "metrics").glob("*.jsonl"))
+    labels = {json.loads(line)["label"] for line in (folder / "rows.jsonl").read_text().splitlines()}
+    assert labels == {row.label for row in contents.rows if contents.metrics_paths(row)}
+
+
+def test_the_checkpoints_that_have_landed_were_trained_as_the_table_says():
+    defaults = dict(re.findall(r'config\.get\("(steps|batch_size)", (\d+)\)', EXCAVATOR.read_text()))
+    folders = list((ROOT / "results" / "excavator" / "checkpoints").iterdir())
+    assert folders
+    for folder in folders:
+        training = json.loads((folder / "training.json").read_text())
+        seed = folder.name.rpartition("-")[2]
+        assert {**defaults, "seed": seed} == {name: str(training[name]) for name in ("steps", "batch_size", "seed")}
+        assert training["demonstrations"] == 240
+        assert training["name"] == folder.name
+        weighs = sum(path.stat().st_size for path in folder.iterdir())
+        assert weighs < 6_000_000

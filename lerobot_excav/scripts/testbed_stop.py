@@ -46,33 +46,36 @@ class TestbedStopArguments(Arguments):
 def run(arguments: TestbedStopArguments) -> int:
     """Send the stop until it is latched."""
     while (why := _attempt(arguments.address)) is not None:
-        print(
+        _say(
             f"THE MACHINE at {arguments.address} DOES NOT SAY THAT IT IS STOPPED ({why}). Use the stop that is wired "
-            "to it. Trying on; Ctrl-C ends this.",
-            file=sys.stderr,
-            flush=True,
+            "to it. Trying on; Ctrl-C ends this."
         )
     print(f"the machine at {arguments.address} is stopped, and stays so until --robot.release_stop=true releases it")
     return 0
+
+
+def _say(words: str) -> None:
+    with contextlib.suppress(OSError):  # nobody may listen any more; the stop goes on
+        print(words, file=sys.stderr, flush=True)
 
 
 def _attempt(address: str) -> str | None:
     """Send stops for `PATIENCE_S`, as a host of its own; return why the machine is not known to be stopped, or None."""
     link = HostLink(host_and_port(address, "--address"), dead_man=NeverHeld(), hold_s=STALE_S)
     link.stop()  # before the first datagram: none of this program may say anything else
-    deadline, why = time.monotonic() + PATIENCE_S, "it is not heard"
+    deadline, why, is_open = time.monotonic() + PATIENCE_S, "it is not heard", False
     with contextlib.closing(link):
-        try:
-            link.connect()
-        except DeviceError as error:  # no way there; perhaps a cable is out
-            time.sleep(PATIENCE_S)
-            return str(error.__cause__ or error)
         while time.monotonic() < deadline:
-            time.sleep(0.02)
-            with contextlib.suppress(DeviceError):  # not heard yet
+            try:
+                if not is_open:  # no way there, perhaps: a cable is out
+                    link.connect()
+                    is_open = True
                 if link.heard().state.flags & StateFlag.STOP_LATCHED:
                     return None
                 why = "it answers, and the stop is not latched"
+            except (DeviceError, OSError) as error:
+                why = str(error) if error.__cause__ is not None or not is_open else "it is not heard"
+            time.sleep(0.02)
     return why
 
 

@@ -53,6 +53,7 @@ class HostLink:
 
     Attributes:
         counts: Datagrams by what came of them: `sent`, `heard`, `overtaken`, `damaged`, `held_too_long`.
+        session: Number by which the machine tells this host from others, drawn when it connects; 0 before.
     """
 
     def __init__(
@@ -65,11 +66,13 @@ class HostLink:
     ) -> None:
         self.address, self.hold_s = address, hold_s
         self.counts: Counter[str] = Counter()
+        self.session = self._number = 0
         self._dead_man, self._clock_us = dead_man, clock_us
         self._lock = threading.Lock()
         self._offset, self._newest = ClockOffset(), Newest()
         self._axes: tuple[float, float, float, float] = STILL
         self._given_us, self._flags = 0, CommandFlag.NONE
+        self._release_after: int | None = None  # number of a command that has to be heard before release is said
         self._heard: Heard | None = None
         self._refusal = Refusal.NONE
         self._thread: threading.Thread | None = None
@@ -90,7 +93,7 @@ class HostLink:
             self._socket.close()
             raise DeviceError(f"robot.address={self.address[0]}:{self.address[1]} cannot be used: {error}") from error
         self._socket.settimeout(0.0)
-        self._session = 1 + secrets.randbelow(65535)
+        self.session = 1 + secrets.randbelow(65535)
         self._number = 0
         self._is_over.clear()
         self._thread = threading.Thread(target=self._run, name="testbed link", daemon=True)
@@ -125,16 +128,17 @@ class HostLink:
         """Stop at once, and stay stopped until `release`."""
         self._require_alive()
         with self._lock:
-            self._flags, self._axes = CommandFlag.EMERGENCY_STOP, STILL
+            self._flags, self._axes, self._release_after = CommandFlag.EMERGENCY_STOP, STILL, None
 
     def release(self) -> None:
         """Ask the machine to release the emergency stop; it does with centred sticks and the dead-man let go.
 
-        It is asked until it says that the stop is not latched any more.
+        It is asked until it says that the stop is not latched any more, or another stop comes: then only a new call
+        releases. Ask once, for every call begins as a new wish does, with a command that does not say release.
         """
         self._require_alive()
         with self._lock:
-            self._flags = CommandFlag.RELEASE
+            self._flags, self._release_after = CommandFlag.NONE, self._number + 1
 
     def heard(self) -> Heard:
         """Return the newest state.
@@ -197,9 +201,7 @@ class HostLink:
             flags |= CommandFlag.DEAD_MAN
         self._number += 1
         age_us = 0 if axes == STILL else age_us + self.way_us  # to stand still is never too old
-        told = Command(
-            session=self._session, number=self._number, host_us=now_us, axes=axes, age_us=age_us, flags=flags
-        )
+        told = Command(session=self.session, number=self._number, host_us=now_us, axes=axes, age_us=age_us, flags=flags)
         with contextlib.suppress(OSError):  # a machine that is switched off answers by refusing
             self._socket.send(told.encode())
             self.counts["sent"] += 1
@@ -225,7 +227,7 @@ class HostLink:
             self.counts["overtaken"] += 1
             return
         self.counts["heard"] += 1
-        if state.command_session == self._session:
+        if state.command_session == self.session:
             self._offset.note(
                 sent_us=state.command_host_us,
                 held_us=state.command_age_us,
@@ -235,9 +237,15 @@ class HostLink:
         true_us = state.machine_us + self._offset.offset_us if self._offset.is_known else came_us
         with self._lock:
             self._heard = Heard(state, min(true_us, came_us))
-            is_latched = bool(state.flags & StateFlag.STOP_LATCHED)
-            if self._flags is CommandFlag.RELEASE and not is_latched and state.command_session == self._session:
-                self._flags = CommandFlag.NONE  # or a later stop would be released by an old wish
+            if state.command_session == self.session:
+                self._note_release(state)
         if state.refusal is not self._refusal:
             self._refusal = state.refusal
             logger.info("the machine says: %s", REFUSAL_WORDS[state.refusal])
+
+    def _note_release(self, state: State) -> None:
+        """Say release once the machine has heard this host without it, until nothing is latched any more."""
+        if self._release_after is not None and state.command_number >= self._release_after:
+            self._flags, self._release_after = CommandFlag.RELEASE, None
+        elif self._flags is CommandFlag.RELEASE and not state.flags & StateFlag.STOP_LATCHED:
+            self._flags = CommandFlag.NONE  # or a later stop would be released by an old wish

@@ -148,7 +148,7 @@ def changed_videos(draw):
     data = draw(GARBAGE)
 
     def apply(folder):
-        videos = folder / "metrics" / "videos" / "x"
+        videos = folder / "metrics" / "paired" / "videos" / "x"
         videos.mkdir(parents=True)
         (videos / f"eval_episode_{number}.mp4").write_bytes(data)
         rows = copy.deepcopy(ROWS)

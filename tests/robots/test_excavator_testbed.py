@@ -119,7 +119,7 @@ def test_a_stop_that_comes_while_the_robot_waits_is_not_released_by_it(robot, be
     with emulated(SIZE, soak_s=5.0) as served:
         gate = served.emulator.gate
         gate.is_stopped = before
-        arm = robot(served, cameras={}, release_stop=True)
+        arm = robot(served, cameras={}, release_stop=True, ready_timeout_s=15.0)
         trouble = []
 
         def connect():
@@ -128,11 +128,15 @@ def test_a_stop_that_comes_while_the_robot_waits_is_not_released_by_it(robot, be
             except DeviceError as error:
                 trouble.append(str(error))
 
-        thread = threading.Thread(target=connect)
+        thread = threading.Thread(target=connect, daemon=True)
         thread.start()
         until(lambda: arm.link is not None and arm.link.counts["heard"] > 10 and not gate.is_stopped)
+        heard = arm.link.counts["heard"]
+        until(lambda: arm.link.counts["heard"] > heard + 20)  # the robot has seen that it is free
         gate.is_stopped = True
-        thread.join(timeout=20.0)
+        thread.join(timeout=30.0)
+        assert not thread.is_alive()
+        assert trouble
         assert "was stopped while the robot waited for it" in trouble[0]
         assert gate.is_stopped
 

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lerobot_excav.testbed.protocol import (
+    MOST_SESSIONS,
     Command,
     CommandFlag,
     DatagramError,
@@ -111,6 +112,18 @@ def test_of_numbers_that_come_in_any_order_only_new_ones_pass_and_they_rise(numb
     assert max(numbers, default=0) == max(passed, default=0)
     assert newest.is_news(8, 1)  # whoever starts again counts from 1
     assert not newest.is_news(8, 1)
+
+
+def test_sessions_may_alternate_and_each_has_its_own_numbers():
+    newest = Newest()
+    assert [newest.is_news(7, 5), newest.is_news(8, 1), newest.is_news(7, 5), newest.is_news(7, 6)] == [1, 1, 0, 1]
+    assert newest.session == 7
+    assert not newest.is_news(8, 1)
+    assert newest.session == 7  # what is no news changes nothing
+    for session in range(100, 100 + MOST_SESSIONS):
+        assert newest.is_news(session, 1)
+    assert newest.is_news(7, 1)  # forgotten; of so many at once none drives
+    assert not newest.is_news(100 + MOST_SESSIONS - 1, 1)
 
 
 def test_the_page_holds_the_tables_of_the_module():

@@ -189,7 +189,10 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         """Send zero with the dead-man let go until the machine is armed."""
         link.let_go(lets_go=self.config.dead_man == "always")
         deadline, words_s, why = time.monotonic() + self.config.ready_timeout_s, 0.0, "it is not heard"
-        was_latched = True  # a stop from before may be released, as the configuration says; a later one may not
+        was_latched, has_asked = (
+            True,
+            False,
+        )  # a stop from before may be released, if so configured; a later one may not
         while time.monotonic() < deadline:
             link.give(STILL)
             time.sleep(0.02)
@@ -197,6 +200,8 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
                 state = link.heard().state
             except DeviceError:
                 continue
+            if state.command_session != link.session:
+                continue  # what it says to another host, or said before it heard this one
             if state.flags & StateFlag.ARMED:
                 link.let_go(lets_go=False)
                 return
@@ -206,8 +211,9 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
                     f"the machine at {self.config.address} was stopped while the robot waited for it. Look at it; then "
                     "begin again with --robot.release_stop=true"
                 )
-            if is_latched and self.config.release_stop:
+            if is_latched and self.config.release_stop and not has_asked:
                 link.release()
+                has_asked = True
             was_latched = is_latched
             why = REFUSAL_WORDS[state.refusal]
             if time.monotonic() - words_s > _WORDS_EVERY_S:
@@ -216,7 +222,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         raise DeviceError(
             f"the machine at {self.config.address} is not ready after {self.config.ready_timeout_s:.0f} s: {why}. Let "
             "go of sticks and dead-man, give --robot.release_stop=true if its emergency stop is latched and all is "
-            "well, and check address and cable"
+            "well, begin again if it was stopped while the robot waited, and check address and cable"
         )
 
     def _ages(self) -> Ages:

@@ -8,6 +8,7 @@ from lerobot_excav.evaluation.result_page import video_grid
 from lerobot_excav.evaluation.result_page.page import make_page
 from lerobot_excav.evaluation.result_page.page_files import write_page
 from lerobot_excav.evaluation.result_page.page_text import page_text
+from lerobot_excav.scripts.main import main
 
 from .conftest import contents
 
@@ -90,6 +91,18 @@ def test_videos_may_lie_elsewhere_by_the_name_of_their_evaluation(finished, tmp_
     (clips,) = finished.clips
     assert [clip.path.name for clip in row.clips] == [f"eval_episode_{number}.mp4" for number in clips.episodes]
     assert all(clip.path.is_relative_to(tmp_path / "films") for clip in row.clips)
+
+
+def test_the_command_says_where_the_videos_lie(finished, tmp_path):
+    """In place of what the file says."""
+    shutil.move(tmp_path / "test/paired/videos", tmp_path / "films/paired/videos")
+    for videos, is_there in (("nowhere", False), ("films", True)):
+        out = tmp_path / f"page of {videos}"
+        assert (
+            main(["report", f"--rows={tmp_path / 'rows.toml'}", f"--videos_folder={tmp_path / videos}", f"--out={out}"])
+            == 0
+        )
+        assert (out / "rollouts.mp4").exists() is is_there
 
 
 def test_a_page_can_be_made_again_from_its_copies(out, again):
