@@ -19,9 +19,13 @@ from lerobot.scripts.lerobot_edit_dataset import EditDatasetConfig
 import lerobot_excav.plugin  # noqa: F401 - registers what the commands name
 from lerobot_excav.datasets.format.schema import excav_features
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
+from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
 from lerobot_excav.evaluation.result_page.contents import read_contents
 from lerobot_excav.scripts.arguments import parse_arguments
+
+from .evaluation.conftest import SCOOP as SCOOP_LINE
+from .evaluation.conftest import line as metrics_line
 
 ROOT = Path(__file__).parents[1]
 SNAKEFILE = ROOT / "workflows" / "fr5_grasp" / "Snakefile"
@@ -116,14 +120,21 @@ def test_shards_play_the_scenes_of_one_piece(dig_plan, tmp_path):
     assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
 
 
-def test_metrics_of_shards_are_put_together_in_their_order(tmp_path):
+def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):
     shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    for name, line in (("a", '{"scene_id": 0}\n'), ("b", '{"scene_id": 1}\n')):
-        (tmp_path / f"{name}.jsonl").write_text(line)
+    episodes = [metrics_line(SCOOP_LINE, number) for number in range(5)]
+    for name, part in (("a", episodes[:2]), ("b", episodes[2:])):
+        parts = [{**episode, "evaluation": name, "episode_ix": number} for number, episode in enumerate(part)]
+        (tmp_path / f"{name}.jsonl").write_text("".join(json.dumps(episode) + "\n" for episode in parts))
         origin = {"command": f"play {name}", "commit": "c", "modified": name == "b", "seconds": 2.0}
         (tmp_path / f"{name}.json").write_text(json.dumps(origin))
     shards["merge_metrics"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"], tmp_path / "whole.jsonl")
-    assert (tmp_path / "whole.jsonl").read_text() == '{"scene_id": 0}\n{"scene_id": 1}\n'
+    whole = read_evaluation(tmp_path / "whole.jsonl")
+    assert whole.of == 1
+    assert [episode.scene_id for episode in whole.episodes.values()] == list(range(5))
+    texts = (tmp_path / "whole.jsonl").read_text().splitlines()
+    same = [{**json.loads(text), "evaluation": 0, "episode_ix": 0} for text in texts]
+    assert same == [{**episode, "evaluation": 0, "episode_ix": 0} for episode in episodes]
     merged = json.loads((tmp_path / "whole.json").read_text())
     assert merged == {"command": "play a && play b", "commit": "c", "modified": True, "seconds": 4.0}
     shards["remove_parts"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"])
@@ -249,6 +260,9 @@ def test_the_page_of_the_excavator_has_a_row_for_all_metrics_that_have_landed():
     contents = read_contents(EXCAVATOR.with_name("rows.toml"), metrics=folder / "metrics")
     landed = {path for row in contents.rows for path in contents.metrics_paths(row).values()}
     assert landed == set((folder / "metrics").glob("*.jsonl"))
+    for path in landed:
+        policy = json.loads(path.with_suffix(".json").read_text())["policy"]
+        assert policy is None or (not Path(policy).is_absolute() and (ROOT / policy).is_dir())
     labels = {json.loads(line)["label"] for line in (folder / "rows.jsonl").read_text().splitlines()}
     assert labels == {row.label for row in contents.rows if contents.metrics_paths(row)}
 

@@ -13,10 +13,16 @@ def ranges(count, shards):
 def merge_metrics(parts, whole):
     """Put metrics files together in their order, and say where the whole comes from.
 
-    Episodes are the same as in one run. Commands, seconds and all else that differs are those of the parts.
+    Episodes are the same as in one run, and numbered so: a reader takes a file whose numbers begin again for several
+    evaluations, of which the last one counts. Commands are all of them, seconds their sum.
     """
     whole = Path(whole)
-    whole.write_text("".join(Path(part).read_text(encoding="utf-8") for part in parts), encoding="utf-8")
+    lines = [json.loads(line) for part in parts for line in Path(part).read_text(encoding="utf-8").splitlines()]
+    first = {"evaluation": lines[0]["evaluation"]} if "evaluation" in lines[0] else {}
+    whole.write_text(
+        "".join(json.dumps({**line, **first, "episode_ix": number}) + "\n" for number, line in enumerate(lines)),
+        encoding="utf-8",
+    )
     origins = [json.loads(Path(part).with_suffix(".json").read_text(encoding="utf-8")) for part in parts]
     merged = {
         **origins[0],
