@@ -37,7 +37,7 @@ def draw_progress(methods: Methods, path: Path) -> None:
     axes.set(xlabel="cycles", ylabel="pile removed [%]", xlim=(0, CYCLES), ylim=(0, 100))
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    figure.savefig(path, metadata={"Software": None})
+    _save(figure, path)
 
 
 def removed_by_cycle(pile: ClearRecord) -> NDArray[np.float64]:
@@ -48,7 +48,7 @@ def removed_by_cycle(pile: ClearRecord) -> NDArray[np.float64]:
 
 def draw_failures(methods: Methods, path: Path) -> None:
     """Draw what came of the cycles, a bar for every method."""
-    figure = _figure(8.0, 0.9 + 0.45 * len(methods))
+    figure = _figure(8.0, 1.3 + 0.45 * len(methods))
     axes = figure.subplots()
     kinds = (NO_FAILURE, *FAILURES)
     shares = 100.0 * np.array([failure_shares(piles) for piles in methods.values()])
@@ -58,8 +58,8 @@ def draw_failures(methods: Methods, path: Path) -> None:
         axes.barh(list(methods), share, left=start, label=label)
     axes.invert_yaxis()
     axes.set(xlabel="cycles [%]", xlim=(0, 100))
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=4)
-    figure.savefig(path, metadata={"Software": None})
+    figure.legend(fontsize=8, loc="outside lower center", ncols=4)
+    _save(figure, path)
 
 
 def failure_shares(piles: Sequence[ClearRecord]) -> list[float]:
@@ -79,7 +79,12 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
         for axes, (name, piles) in zip(panels, methods.items(), strict=True):
             draw_pile(axes, next(pile for pile in piles if pile.key == min(shared)))
             axes.set_title(f"{name}\n{axes.get_title()}", fontsize=8)
-    figure.savefig(path, metadata={"Software": None})
+    _save(figure, path)
+
+
+def _save(figure: "Figure", path: Path) -> None:
+    # Tight, because the constrained layout lets titles of panels of a fixed aspect reach beyond the picture.
+    figure.savefig(path, metadata={"Software": None}, bbox_inches="tight", pad_inches=0.08)
 
 
 def _figure(width_in: float, height_in: float) -> "Figure":
