@@ -220,9 +220,9 @@ class Newest:
 
         Duplicates and those that were overtaken on the way are not. Numbers do not wrap: at 50 Hz they last 2.7 years.
         """
-        newest = self._numbers.pop(session, None)
-        is_news = newest is None or number > newest
-        self._numbers[session] = number if newest is None or is_news else newest
+        newest = self._numbers.pop(session, number - 1)
+        is_news = number > newest
+        self._numbers[session] = max(number, newest)
         while len(self._numbers) > MOST_SESSIONS:
             del self._numbers[next(iter(self._numbers))]
         if is_news:

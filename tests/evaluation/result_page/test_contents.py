@@ -24,10 +24,7 @@ PAPER = SECTION + 'rows = [{ label = "a", about = "x", paper = %s }]'
             r"\['a'\] stands on the page twice",
         ),
         ("[[curve]]\nlabel = 'a'\nfolder = 'v/c'\n" * 2, r"\['c'\] are the folders of two curves"),
-        (
-            '[[clips]]\nlabel = "a"\nepisode = [1]',
-            r"clips\[0\]\.episode is not known; allowed: label, episodes",
-        ),
+        ('[[clips]]\nlabel = "a"\nepisode = [1]', r"clips\[0\]\.episode is not known; allowed: label, episodes"),
         ("[[", "is not TOML"),
         ("text = 3", "text=3: input should be a valid string"),
         ("section = 3", "section=3: input should be a valid array"),
