@@ -27,7 +27,7 @@ LAYERS = [
     ],
     ["policies"],
 ]
-SHARED = {"errors", "run_lock", "setting", "whole_file"}
+SHARED = {"errors", "loopback", "run_lock", "setting", "whole_file"}
 DATASET_LAYERS = ["format", "pairs", "record", "complete", "check", "card", "masks", "clicks", "alignment"]
 FREE = {"plugin", "scripts.export"}
 

@@ -1,7 +1,6 @@
 """Who may open the page: whoever knows the token, from this machine unless other hosts were asked for."""
 
 import hmac
-import ipaddress
 import secrets
 import socket
 from collections.abc import Mapping
@@ -9,6 +8,7 @@ from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
 from lerobot_excav.errors import DeviceError
+from lerobot_excav.loopback import is_address, is_loopback
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
@@ -63,20 +63,7 @@ class Access:
             return False
         if name in LOOPBACK or name.strip("[]") == self.host:
             return True
-        return not is_loopback(self.host) and _is_address(name.strip("[]"))
-
-
-def is_loopback(host: str) -> bool:
-    """Tell whether an address reaches this machine alone."""
-    return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
-
-
-def _is_address(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True
+        return not is_loopback(self.host) and is_address(name.strip("[]"))
 
 
 def outward_address() -> str:

@@ -33,6 +33,11 @@ class MaskArguments(Arguments):
 
     text: str | None = setting("What to look for; left out: what the options say, or the task", default=None)
     options: str | None = setting("TOML file of all that the source can be told", default=None)
+    snap: bool = setting(
+        "Whether a small network marks the object under the middle of each mask, and that is taken in its place: mends "
+        "masks that lie a little off their object",
+        default=False,
+    )
 
 
 @dataclass(kw_only=True)
@@ -60,6 +65,7 @@ def run(arguments: MasksArguments) -> int:
         source=source,
         options=arguments.mask.options,
         text=arguments.mask.text,
+        snap=arguments.mask.snap,
         main_camera=arguments.main_camera,
         show_progress=True,
     )

@@ -23,6 +23,7 @@ from lerobot_excav.envs.tasks.settings import LAST_SCENE
 from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 from lerobot_excav.setting import setting
+from lerobot_excav.testbed.address import USUAL_PORT
 from lerobot_excav.testbed.protocol import RATE_HZ
 from lerobot_excav.testbed.safety import SOAK_S
 
@@ -36,7 +37,7 @@ class TestbedEmulatorArguments(Arguments):
     env: EnvironmentChoice = field(default_factory=EnvironmentChoice.default)
     """Worksite of the machine; the excavator's single cycle by default."""
     host: str = setting("Address to listen at; only this computer reaches 127.0.0.1", default="127.0.0.1")
-    port: int = setting("Port of the datagrams; 0 takes a free one", default=47500, low=0, high=65535)
+    port: int = setting("Port of the datagrams; 0 takes a free one", default=USUAL_PORT, low=0, high=65535)
     picture_port: int = setting("Port of the pictures; 0 takes a free one", default=47501, low=0, high=65535)
     first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
     pictures_hz: int = setting("Pictures a second of each camera", default=10, choices=RATES)

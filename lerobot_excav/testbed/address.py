@@ -4,7 +4,11 @@ import ipaddress
 
 from lerobot_excav.errors import ConfigurationError
 
-USUAL_ADDRESS = "127.0.0.1:47500"
+USUAL_PORT = 47500
+"""Port of a machine's datagrams (kind: guess; not registered to anybody)."""
+
+USUAL_ADDRESS = f"127.0.0.1:{USUAL_PORT}"
+"""Of the emulator on this computer."""
 
 
 def host_and_port(address: str, field: str) -> tuple[str, int]:
@@ -24,11 +28,6 @@ def host_and_port(address: str, field: str) -> tuple[str, int]:
         raise ConfigurationError(
             f"{field}={address!r} is not an address and a port, such as 192.168.1.20:47500"
         ) from error
-
-
-def is_loopback(host: str) -> bool:
-    """Tell whether an address is this computer's own."""
-    return ipaddress.IPv4Address(host).is_loopback
 
 
 def _checked_port(text: str) -> int:

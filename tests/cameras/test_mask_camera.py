@@ -1,7 +1,7 @@
 """A mask as one more camera of anybody's robot, whose class knows nothing of it."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import draccus
@@ -141,6 +141,22 @@ def test_the_mask_stays_until_the_command_changes(connected, tmp_path, monkeypat
     command.unlink()
     with pytest.raises(ConfigurationError, match="cannot be read"):
         camera.read()
+
+
+def test_a_mask_is_snapped_if_the_camera_says_so(connected, monkeypatch):
+    class Aside:
+        """Snaps each mask one pixel to the right."""
+
+        def snap(self, mask, view):
+            return replace(mask, pixels=np.roll(mask.pixels, 1, axis=1))
+
+    monkeypatch.setattr("lerobot_excav.envs.masks.snapped.Snapper", Aside)
+    plain = connected("source: colour_of_words, text: red")
+    shown = plain["target_mask"].read()
+    for camera in plain.values():
+        camera.disconnect()
+    snapped = connected("source: colour_of_words, text: red, snap: true")["target_mask"].read()
+    assert np.array_equal(snapped, np.roll(shown, 1, axis=1))
 
 
 @pytest.mark.parametrize(

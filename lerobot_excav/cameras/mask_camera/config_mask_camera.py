@@ -23,6 +23,7 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
         options: TOML file of what the source is told.
         text: What to look for, before what the options say.
         command: Text file that holds what to look for; whenever it changes, the mask is made again.
+        snap: Whether each mask is snapped onto the object under its middle, by the small network of `mask_snap`.
 
     Raises:
         ConfigurationError: There is no such source, it chooses targets itself, or the size is missing.
@@ -33,6 +34,7 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
     options: str | None = None
     text: str | None = None
     command: Path | None = None
+    snap: bool = False
     fps: int | None = ANY_FPS
 
     def __post_init__(self) -> None:

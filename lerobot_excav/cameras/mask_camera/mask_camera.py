@@ -10,6 +10,7 @@ from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfi
 from lerobot_excav.cameras.shared_camera.shared_camera import SharedCamera
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.picture_view import PictureView
+from lerobot_excav.envs.masks.snapped import SnappedMasks
 from lerobot_excav.envs.masks.source import MaskMissingError, make_mask_source
 from lerobot_excav.errors import ConfigurationError, DeviceError
 
@@ -102,6 +103,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
                 f"{(config.height, config.width)} (height, width); give both the same size"
             )
         source = make_mask_source(config.source, options=config.options, text=told)
+        source = SnappedMasks(source) if config.snap else source
         view = PictureView(picture, key=KEY, words=told or "")
         mask = source.mask(view, Command(target_id=0, region=None))
         if mask is None or not mask.pixels.any():

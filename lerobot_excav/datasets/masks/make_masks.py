@@ -18,6 +18,7 @@ from lerobot_excav.datasets.masks.found_masks import FoundMask, FoundMasks
 from lerobot_excav.datasets.masks.mask_column import write_with_masks
 from lerobot_excav.datasets.pairs.paired_index import write_index
 from lerobot_excav.envs.masks.picture_view import PictureView
+from lerobot_excav.envs.masks.snapped import SnappedMasks
 from lerobot_excav.envs.masks.source import MaskSource, chooses_target, make_mask_source
 from lerobot_excav.errors import require
 
@@ -32,6 +33,7 @@ def make_masks(
     source: str,
     options: str | None = None,
     text: str | None = None,
+    snap: bool = False,
     main_camera: str | None = None,
     show_progress: bool = False,
 ) -> int:
@@ -43,6 +45,7 @@ def make_masks(
         source: Name of the source.
         options: TOML file of what it is told.
         text: What to look for, before what the options and the task say.
+        snap: Whether each mask is snapped onto the object under its middle.
         main_camera: Camera of a dataset of somebody else, as in its features.
         show_progress: Whether to draw a bar.
 
@@ -57,9 +60,13 @@ def make_masks(
     info = read_info(root)
     is_ours = PAIR_KEY in info.features
     _require_use(root, out, source, main_camera, text, is_ours=is_ours)
+    if is_ours and snap:
+        info.spec.make_settings(mask_snap=True)  # refused where there is nothing to snap to
     made = make_mask_source(source, options=options, text=text)
+    made = SnappedMasks(made) if snap else made
     settings = {
         **{"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera},
+        **({"snap": True} if snap else {}),
         "told": None if options is None else _digest([Path(options)]),
         "episodes": _digest([root / INFO_PATH, *sorted(root.glob("meta/episodes/*/*.parquet"))]),
     }

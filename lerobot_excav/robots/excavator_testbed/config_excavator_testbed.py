@@ -7,8 +7,9 @@ from lerobot.cameras import CameraConfig
 from lerobot.robots import RobotConfig
 
 from lerobot_excav.errors import require, shown
+from lerobot_excav.loopback import is_loopback
 from lerobot_excav.setting import check_settings, setting
-from lerobot_excav.testbed.address import USUAL_ADDRESS, host_and_port, is_loopback
+from lerobot_excav.testbed.address import USUAL_ADDRESS, host_and_port
 
 DEAD_MEN = ("always", "gamepad")
 

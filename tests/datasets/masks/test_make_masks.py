@@ -232,3 +232,27 @@ def test_a_text_is_taken_as_it_stands(foreign, tmp_path, monkeypatch, text):
     )
     main(["masks", str(foreign), "--source=grounded_sam", f"--mask.text={text}", f"--out={tmp_path / 'out'}"])
     assert told["text"] == text
+
+
+@pytest.mark.slow
+def test_masks_of_blocks_are_snapped_onto_them_and_the_provenance_says_so(tmp_path):
+    demos = ["--env.type=fr5_grasp", "--env.episode_length=6", "--scenes=1", "--keep_failures", "--workers=0"]
+    assert main(["demos", *demos, f"--out={tmp_path / 'shown'}"]) == 0
+    asked = ["--source=oracle", "--mask.snap=true", f"--out={tmp_path / 'snapped'}"]
+    assert main(["masks", str(tmp_path / "shown"), *asked]) == 0
+    shown, snapped = masks_of(tmp_path / "shown"), masks_of(tmp_path / "snapped")
+    assert not np.array_equal(shown, snapped)
+    assert np.logical_and(shown, snapped).sum() > 0.8 * np.logical_or(shown, snapped).sum()
+    noted = json.loads((tmp_path / "snapped" / PROVENANCE_PATH).read_text())
+    assert noted["snap"] is True
+    assert {mask["snap"] for episode in noted["episodes"] for mask in episode["masks"]} == {"snapped"}
+
+
+@pytest.mark.slow
+def test_there_is_nothing_to_snap_to_on_the_ground(tmp_path, capsys):
+    demos = ["--env.type=excavator", "--env.fidelity=fast", "--env.episode_length=6", "--scenes=1", "--workers=0"]
+    assert main(["demos", *demos, "--keep_failures", f"--out={tmp_path / 'shown'}"]) == 0
+    asked = ["--source=oracle", "--mask.snap=true", f"--out={tmp_path / 'snapped'}"]
+    assert main(["masks", str(tmp_path / "shown"), *asked]) == 2
+    assert "no use on the ground" in capsys.readouterr().err
+    assert not (tmp_path / "snapped").exists()

@@ -1,11 +1,13 @@
 """Imprecise masks are snapped onto what lies under their middle; `fr5_grasp` shows it, and its blocks are objects."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lerobot_excav.envs.masks.corrupted import CorruptedSource
 from lerobot_excav.envs.masks.oracle import OracleSource
-from lerobot_excav.envs.masks.snapped import SnappedSource
+from lerobot_excav.envs.masks.snapped import SnappedMasks, SnappedSource
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 
 SCENES = range(6)
@@ -78,8 +80,28 @@ def test_a_mask_under_which_nothing_like_it_is_found_stays_and_says_so(wrong):
     env.reset(seed=1)
     corrupted = CorruptedSource(OracleSource(), condition="correct", noise="none", noise_px=0)
     source = SnappedSource(corrupted)
-    source._clicks._segmenter = wrong
+    source._snapper._clicks._segmenter = wrong
     mask = source.mask(env, env.command)
     assert np.array_equal(mask.pixels, env.mask.pixels)
     assert mask.parameters["snap"] == "nothing like it there"
+    env.close()
+
+
+def test_the_masks_of_any_source_are_snapped_and_nothing_stays_nothing(right):
+    env = FR5GraspEnv(scene_set="val")
+    env.reset(seed=0)
+
+    class Beside:
+        moved = 4
+
+        def mask(self, view, command):
+            shown = OracleSource().mask(view, command)
+            return None if self.moved is None else replace(shown, pixels=np.roll(shown.pixels, self.moved, axis=1))
+
+    source = Beside()
+    snapped = SnappedMasks(source).mask(env, env.command)
+    assert overlap(snapped.pixels[None], right[:1]) > 0.8
+    assert snapped.parameters["snap"] == "snapped"
+    source.moved = None
+    assert SnappedMasks(source).mask(env, env.command) is None
     env.close()
