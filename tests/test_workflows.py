@@ -120,15 +120,39 @@ def test_shards_play_the_scenes_of_one_piece(dig_plan, tmp_path):
     assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
 
 
+EPISODES = [metrics_line(SCOOP_LINE, number) for number in range(5)]
+
+
+def write_parts(folder, **of_b):
+    """Write the metrics of two parts, `a` and `b`; `of_b` is what differs in the origin of the second."""
+    for name, part in (("a", EPISODES[:2]), ("b", EPISODES[2:])):
+        parts = [{**episode, "evaluation": name, "episode_ix": number} for number, episode in enumerate(part)]
+        (folder / f"{name}.jsonl").write_text("".join(json.dumps(episode) + "\n" for episode in parts))
+        origin = {"command": f"play {name}", "commit": "c", "modified": name == "b", "seconds": 2.0}
+        origin |= {"policy": "p", "packages": {"mujoco": "3"}, **(of_b if name == "b" else {})}
+        (folder / f"{name}.json").write_text(json.dumps(origin))
+    return [folder / "a.jsonl", folder / "b.jsonl"]
+
+
+def test_parts_of_different_commits_say_so(tmp_path):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    shards["merge_metrics"](write_parts(tmp_path, commit="d"), tmp_path / "whole.jsonl")
+    merged = json.loads((tmp_path / "whole.json").read_text())
+    assert merged["command"] == "play a && play b  # parts by commits c, d"
+
+
+@pytest.mark.parametrize("differs", [{"policy": "q"}, {"packages": {"mujoco": "4"}}])
+def test_parts_of_another_policy_or_of_other_packages_are_not_put_together(tmp_path, differs):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    with pytest.raises(Exception, match=f"{next(iter(differs))} of .*b.jsonl differs"):
+        shards["merge_metrics"](write_parts(tmp_path, **differs), tmp_path / "whole.jsonl")
+    assert {path.stem for path in tmp_path.iterdir()} == {"a", "b"}
+
+
 def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):
     shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    episodes = [metrics_line(SCOOP_LINE, number) for number in range(5)]
-    for name, part in (("a", episodes[:2]), ("b", episodes[2:])):
-        parts = [{**episode, "evaluation": name, "episode_ix": number} for number, episode in enumerate(part)]
-        (tmp_path / f"{name}.jsonl").write_text("".join(json.dumps(episode) + "\n" for episode in parts))
-        origin = {"command": f"play {name}", "commit": "c", "modified": name == "b", "seconds": 2.0}
-        (tmp_path / f"{name}.json").write_text(json.dumps(origin))
-    shards["merge_metrics"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"], tmp_path / "whole.jsonl")
+    episodes = EPISODES
+    shards["merge_metrics"](write_parts(tmp_path), tmp_path / "whole.jsonl")
     whole = read_evaluation(tmp_path / "whole.jsonl")
     assert whole.of == 1
     assert [episode.scene_id for episode in whole.episodes.values()] == list(range(5))
@@ -136,7 +160,8 @@ def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evalu
     same = [{**json.loads(text), "evaluation": 0, "episode_ix": 0} for text in texts]
     assert same == [{**episode, "evaluation": 0, "episode_ix": 0} for episode in episodes]
     merged = json.loads((tmp_path / "whole.json").read_text())
-    assert merged == {"command": "play a && play b", "commit": "c", "modified": True, "seconds": 4.0}
+    known = {"commit": "c", "policy": "p", "packages": {"mujoco": "3"}}
+    assert merged == {"command": "play a && play b", "modified": True, "seconds": 4.0, **known}
     shards["remove_parts"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"])
     assert {path.name for path in tmp_path.iterdir()} == {"whole.jsonl", "whole.json"}
 
@@ -263,8 +288,8 @@ def test_the_page_of_the_excavator_has_a_row_for_all_metrics_that_have_landed():
     for path in landed:
         policy = json.loads(path.with_suffix(".json").read_text())["policy"]
         assert policy is None or (not Path(policy).is_absolute() and (ROOT / policy).is_dir())
-    labels = {json.loads(line)["label"] for line in (folder / "rows.jsonl").read_text().splitlines()}
-    assert labels == {row.label for row in contents.rows if contents.metrics_paths(row)}
+    rows = [json.loads(line) for line in (folder / "rows.jsonl").read_text().splitlines()]
+    assert {name for row in rows for name in row["origins"]} == {path.stem for path in landed}
 
 
 def test_the_checkpoints_that_have_landed_were_trained_as_the_table_says():

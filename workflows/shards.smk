@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+from snakemake.exceptions import WorkflowError
+
 
 def ranges(count, shards):
     """Divide `count` scenes into at most `shards` ranges of nearly equal length: pairs of first and number."""
@@ -14,23 +16,34 @@ def merge_metrics(parts, whole):
     """Put metrics files together in their order, and say where the whole comes from.
 
     Episodes are the same as in one run, and numbered so: a reader takes a file whose numbers begin again for several
-    evaluations, of which the last one counts. Commands are all of them, seconds their sum.
+    evaluations, of which the last one counts. Commands are all of them, seconds their sum; where parts were played by
+    other code, the commands say by which. The whole appears when all of it is written.
+
+    Raises:
+        WorkflowError: Parts are of other policies, or were played with other versions of packages.
     """
     whole = Path(whole)
     lines = [json.loads(line) for part in parts for line in Path(part).read_text(encoding="utf-8").splitlines()]
     first = {"evaluation": lines[0]["evaluation"]} if "evaluation" in lines[0] else {}
-    whole.write_text(
-        "".join(json.dumps({**line, **first, "episode_ix": number}) + "\n" for number, line in enumerate(lines)),
-        encoding="utf-8",
-    )
     origins = [json.loads(Path(part).with_suffix(".json").read_text(encoding="utf-8")) for part in parts]
+    for name in ("policy", "packages"):
+        if differing := [str(part) for part, origin in zip(parts, origins) if origin[name] != origins[0][name]]:
+            raise WorkflowError(
+                f"{name} of {', '.join(differing)} differs from that of {parts[0]}; remove one side, to play it again"
+            )
+    commits = list(dict.fromkeys(str(origin["commit"]) for origin in origins))
     merged = {
         **origins[0],
-        "command": " && ".join(origin["command"] for origin in origins),
+        "command": " && ".join(origin["command"] for origin in origins)
+        + (f"  # parts by commits {', '.join(commits)}" if len(commits) > 1 else ""),
         "seconds": sum(origin["seconds"] or 0.0 for origin in origins),
         "modified": any(origin["modified"] for origin in origins),
     }
     whole.with_suffix(".json").write_text(json.dumps(merged, indent=1) + "\n", encoding="utf-8")
+    text = "".join(json.dumps({**line, **first, "episode_ix": number}) + "\n" for number, line in enumerate(lines))
+    unfinished = whole.with_suffix(".tmp")
+    unfinished.write_text(text, encoding="utf-8")
+    unfinished.replace(whole)
 
 
 def remove_parts(parts):

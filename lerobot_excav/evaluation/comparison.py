@@ -12,7 +12,13 @@ from lerobot_excav.errors import DatasetError, require
 from lerobot_excav.evaluation.crossed_effects import difference_over_seeds
 from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.run import Run
-from lerobot_excav.evaluation.statistics import Interval, mcnemar_exact, newcombe_interval
+from lerobot_excav.evaluation.statistics import (
+    Interval,
+    difference_of_rates,
+    mcnemar_exact,
+    newcombe_interval,
+    wilson_interval,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,13 +29,15 @@ class Difference:
         measure: Key of its column.
         difference: Second minus first, over scenes and targets; of rates with single seeds with Newcombe's interval,
             else with that of `crossed_effects`, over seeds and scenes.
-        p_value: McNemar's exact test where the interval is Newcombe's, else that of `crossed_effects`.
-        p_corrected: Corrected for the number of rows that are compared with one reference; None where only one is.
+        p_value: McNemar's exact test where the interval is Newcombe's, else that of `crossed_effects`; None where a
+            single scene tells nothing.
+        p_corrected: Corrected for the number of rows that are compared with one reference; None where only one is, or
+            where there is no p-value.
     """
 
     measure: str
     difference: Interval
-    p_value: float
+    p_value: float | None
     p_corrected: float | None = None
 
 
@@ -100,16 +108,33 @@ def _value(evaluation: Evaluation, key: EpisodeKey, measure: str) -> float:
 def _difference(column: Column, first: Run, second: Run) -> Difference:
     values = values_by_seed(first, column.field), values_by_seed(second, column.field)
     if column.kind is Kind.RATE and len(first.evaluations) == len(second.evaluations) == 1:
-        difference, p_value = _paired_rates(values[0][0] == 1.0, values[1][0] == 1.0)
-    else:
-        difference, p_value = difference_over_seeds(*values)
-    if column.kind is Kind.RATE and max(map(len, values)) > 1:
-        # Where all episodes end alike nothing varies, and still they might have ended otherwise.
-        least, least_p = _paired_rates(*(outcomes.mean(axis=0) > 0.5 for outcomes in values))
-        low, high = min(difference.low, least.low), max(difference.high, least.high)
-        difference = replace(difference, low=max(-1.0, low), high=min(1.0, high))
-        p_value = max(p_value, least_p)
+        of_rates, exact = _paired_rates(values[0][0] == 1.0, values[1][0] == 1.0)
+        return Difference(measure=column.key, difference=of_rates, p_value=exact)
+    are_trained = first.first.operator is None, second.first.operator is None
+    difference, p_value = difference_over_seeds(*values, are_trained=are_trained)
+    if column.kind is Kind.RATE:
+        difference, p_value = _no_surer_than_scenes(difference, p_value, *(each.mean(axis=0) for each in values))
     return Difference(measure=column.key, difference=difference, p_value=p_value)
+
+
+def _no_surer_than_scenes(
+    difference: Interval, p_value: float | None, before: NDArray[np.float64], after: NDArray[np.float64]
+) -> tuple[Interval, float | None]:
+    """Let a difference of rates be no surer than its scenes allow, given the rate on each of them over the seeds.
+
+    Where all episodes end alike nothing varies, and still they might have ended otherwise. So an interval is at least
+    as wide as Wilson's intervals over the scenes make it, and no p-value is below the least that a test can reach which
+    turns signs around: that of m scenes that differ is 2 / 2**m.
+    """
+    first, second = (wilson_interval(round(rates.sum()), len(rates)) for rates in (before, after))
+    varies = before.std() > 0.0 < after.std()
+    correlation = float(np.corrcoef(before, after)[0, 1]) if varies else 0.0
+    least = difference_of_rates(first, second, correlation=correlation)
+    low = min(difference.low, difference.estimate - (least.estimate - least.low))
+    high = max(difference.high, difference.estimate + (least.high - least.estimate))
+    least_p = min(1.0, 2.0 ** (1 - int(np.count_nonzero(before != after))))
+    wide = replace(difference, low=max(-1.0, low), high=min(1.0, high))
+    return wide, None if p_value is None else max(p_value, least_p)
 
 
 def _paired_rates(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[Interval, float]:

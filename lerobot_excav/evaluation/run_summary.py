@@ -1,7 +1,7 @@
 """A run in numbers: one row of a report."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -67,9 +67,15 @@ def _value(column: Column, run: Run, operator: Run | None, rng: np.random.Genera
         return None
     values = values_by_seed(run, column.field)
     if operator is None or column.kind is Kind.MEAN:
-        return mean_over_seeds(values) if len(values) > 1 else bootstrap_mean(values[0], rng)
+        mean = mean_over_seeds(values) if len(values) > 1 else bootstrap_mean(values[0], rng)
+        return mean if column.bounds is None else _within(mean, *column.bounds)
     theirs = matched(run, operator, column.field)
     return ratio_over_seeds(values, theirs) if len(values) > 1 else bootstrap_ratio(values[0], theirs, rng)
+
+
+def _within(interval: Interval, low: float, high: float) -> Interval:
+    """Cut an interval off where nothing can be: Student's knows nothing of bounds."""
+    return replace(interval, low=max(low, interval.low), high=min(high, interval.high))
 
 
 def _rate(column: Column, run: Run) -> Interval | None:
@@ -86,5 +92,5 @@ def _rate(column: Column, run: Run) -> Interval | None:
         return rate if len(known) == len(outcomes) else RateOf(**asdict(rate), n=len(known))
     crossed = mean_over_seeds(values_by_seed(run, column.field))
     least = wilson_interval(round(crossed.estimate * len(run.keys)), len(run.keys))
-    low, high = min(crossed.low, least.low), max(crossed.high, least.high)
-    return Interval(estimate=crossed.estimate, low=max(0.0, low), high=min(1.0, high))
+    wide = replace(crossed, low=min(crossed.low, least.low), high=max(crossed.high, least.high))
+    return _within(wide, 0.0, 1.0)

@@ -74,12 +74,16 @@ def newcombe_interval(both: int, first_only: int, second_only: int, neither: int
     require(min(counts) >= 0, f"counts must not be negative: {counts}")
     n = sum(counts)
     first, second = wilson_interval(both + first_only, n), wilson_interval(both + second_only, n)
-    phi = _cautious_correlation(*counts)
+    return difference_of_rates(first, second, correlation=_cautious_correlation(*counts))
+
+
+def difference_of_rates(first: Interval, second: Interval, *, correlation: float) -> Interval:
+    """Put the intervals of two rates together to that of their difference `second - first`, as Newcombe does."""
 
     def together(a: float, b: float) -> float:
-        return math.sqrt(a * a - 2.0 * phi * a * b + b * b)
+        return math.sqrt(max(0.0, a * a - 2.0 * correlation * a * b + b * b))
 
-    difference = (second_only - first_only) / n
+    difference = second.estimate - first.estimate
     below = together(second.estimate - second.low, first.high - first.estimate)
     above = together(second.high - second.estimate, first.estimate - first.low)
     return Interval(estimate=difference, low=max(-1.0, difference - below), high=min(1.0, difference + above))

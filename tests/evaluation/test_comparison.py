@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from lerobot_excav.errors import DatasetError
@@ -38,6 +39,42 @@ def test_several_trainings_that_all_succeed_are_not_beyond_doubt(make_run, scoop
     assert target.difference.estimate == -1.0
     assert target.difference.high > -0.7
     assert target.p_value == pytest.approx(2 / 2**6)
+
+
+def hits(scoop_line, outcomes):
+    return [scoop_line(scene, target_success=bool(hit)) for scene, hit in enumerate(outcomes)]
+
+
+def test_rates_of_three_trainings_that_clearly_differ_are_told_apart(make_run, scoop_line):
+    """A tenth of the scoops misses, in other scenes by each training: a majority hits everywhere."""
+    scenes = np.arange(50)
+    first = make_run("a", *(hits(scoop_line, scenes >= 0) for _ in range(3)))
+    second = make_run("b", *(hits(scoop_line, (scenes + seed) % 10 > 0) for seed in range(3)))
+    target, *_ = compare(first, second)
+    assert target.difference.estimate == pytest.approx(-0.1)
+    assert target.difference.high < 0.0
+    assert target.p_value < 0.01
+
+
+def test_equal_rates_differ_by_nothing_whatever_the_number_of_trainings(make_run, scoop_line):
+    scenes = np.arange(50)
+    runs = [
+        make_run(f"{seeds} seeds", *(hits(scoop_line, (scenes + 3 * seed) % 10 > 0) for seed in range(seeds)))
+        for seeds in (2, 3)
+    ]
+    target, *_ = compare(*runs)
+    assert target.difference.estimate == pytest.approx(0.0)
+    assert -0.2 < target.difference.low < 0.0 < target.difference.high < 0.2
+    assert target.difference.low == pytest.approx(-target.difference.high, abs=0.01)
+    assert target.p_value > 0.5
+
+
+def test_a_difference_in_few_scenes_is_no_surer_than_they_allow(make_run, scoop_line):
+    first = make_run("a", *(hits(scoop_line, np.ones(6)) for _ in range(3)))
+    second = make_run("b", hits(scoop_line, [0, 0, 0, 0, 0, 1]), *(hits(scoop_line, np.zeros(6)) for _ in range(2)))
+    target, *_ = compare(first, second)
+    assert target.p_value >= 2 / 2**6
+    assert target.difference.high > -0.8
 
 
 def test_runs_on_other_scenes_are_not_compared(make_run, scoop_line):

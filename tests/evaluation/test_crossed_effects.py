@@ -43,6 +43,34 @@ def test_a_clear_difference_of_three_trainings_is_found():
     assert difference.low < 50.0 < difference.high
 
 
+@pytest.mark.parametrize("seeds", [(1, 3), (3, 1), (1, 5)])
+def test_a_single_training_varies_as_those_do_with_which_it_is_compared(seeds):
+    rng, p_values, held = np.random.default_rng(6), [], []
+    for _ in range(600):
+        scenes = rng.normal(0.0, 1.0, (1, 40))
+        first, second = (scenes + drawn(rng, n, 40, by_seed=2.0, by_scene=0.0, rest=0.3) for n in seeds)
+        difference, p_value = difference_over_seeds(first, second)
+        p_values.append(p_value)
+        held.append(difference.low <= 0.0 <= difference.high)
+    assert np.mean(np.array(p_values) < 0.05) < 0.07
+    assert np.mean(held) > 0.93
+
+
+def test_an_operator_has_no_seeds_that_could_vary():
+    rng = np.random.default_rng(7)
+    policy, operator = drawn(rng, seeds=3, by_seed=2.0), drawn(rng, seeds=1, by_seed=0.0)
+    (trained, _), (fixed, _) = (
+        difference_over_seeds(operator, policy, are_trained=(is_trained, True)) for is_trained in (True, False)
+    )
+    assert trained.estimate == fixed.estimate
+    assert fixed.high - fixed.low < 0.6 * (trained.high - trained.low)
+
+
+def test_a_single_scene_of_single_trainings_tells_nothing():
+    difference, p_value = difference_over_seeds(np.array([[70.0]]), np.array([[80.0]]))
+    assert (difference.low, difference.estimate, difference.high, p_value) == (10.0, 10.0, 10.0, None)
+
+
 def test_of_single_trainings_it_is_the_paired_t_test():
     first, second = np.random.default_rng(3).normal(0.0, 1.0, (2, 1, 25))
     difference, p_value = difference_over_seeds(first, second + 0.3)
@@ -78,6 +106,13 @@ def test_holm_is_as_in_a_textbook():
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert holm([0.5, 0.9]) == [1.0, 1.0]
     assert holm([]) == []
+
+
+def test_comparisons_that_are_not_made_yet_count_as_the_largest():
+    assert holm([0.01, 0.03], family=4) == pytest.approx([0.04, 0.09])
+    assert holm([0.02], family=5) == pytest.approx([0.1])
+    with pytest.raises(ConfigurationError, match="family=1 is less"):
+        holm([0.1, 0.2], family=1)
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))

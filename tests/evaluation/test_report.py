@@ -56,14 +56,14 @@ def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, scoop_l
     assert "seed 5" in report_text(second)
 
 
-@pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"simulation_version": 1}])
+@pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"fidelity": "fast"}, {"simulation_version": 1}])
 def test_runs_whose_scenes_differ_stand_side_by_side_but_are_not_related(runs, make_run, scoop_line, changes):
     other = make_run("other", [scoop_line(i, **changes) for i in range(10)])
-    with pytest.raises(DatasetError, match=r"half dug sand in version 5 .* and other dug"):
+    with pytest.raises(DatasetError, match=r"half dug sand at standard fidelity in version 5 .* and other dug"):
         make_report(runs[:1], operator=other)
     report = make_report([runs[0], other])
     assert report.differences == {}
-    assert "no paired differences to other: half dug sand in version 5" in report_text(report)
+    assert "no paired differences to other: half dug sand at standard fidelity in version 5" in report_text(report)
 
 
 def test_commands_may_change_at_other_frames_in_every_episode(make_run, grasp_line):

@@ -160,11 +160,11 @@ class Kind(Enum):
     """How a column sums up episodes."""
 
     RATE = auto()
-    """Share of the episodes with a truth value that is true; Wilson interval over these episodes."""
+    """Share of the episodes with a truth value that is true."""
     MEAN = auto()
-    """Mean; bootstrap interval over scenes and targets."""
+    """Mean over training seeds, scenes and targets."""
     RATIO = auto()
-    """Mean over the operator's on the same scenes and targets; bootstrap interval."""
+    """Mean over the operator's on the same scenes and targets."""
     COUNTS = auto()
     """How often each word occurs."""
 
@@ -179,6 +179,7 @@ class Column:
         kind: How episodes are summed up.
         field: Field or property of the task's record; None leaves an episode out of a rate.
         words: For counts, all words in the order of the table.
+        bounds: Values between which a mean lies, as no interval may leave them; None without such bounds.
     """
 
     key: str
@@ -186,6 +187,7 @@ class Column:
     kind: Kind
     field: str
     words: tuple[str, ...] = ()
+    bounds: tuple[float, float] | None = None
 
     @property
     def scale(self) -> float:

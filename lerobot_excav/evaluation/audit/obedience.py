@@ -17,6 +17,7 @@ class Obedience:
 
     Attributes:
         scenes: Scenes.
+        compared_scenes: Those in which at least two masks made the machine act, of which the slope is made.
         branches: Masks shown, over all scenes.
         acted: Which part of them made the machine act at all.
         success: Which part of them ended in success.
@@ -28,6 +29,7 @@ class Obedience:
     """
 
     scenes: int
+    compared_scenes: int
     branches: int
     acted: Interval
     success: Interval
@@ -48,6 +50,7 @@ def obedience(branches: Sequence[Branch], operator: Sequence[Branch], rng: np.ra
     by_scene = _acted_by_scene(branches)
     return Obedience(
         scenes=len({branch.scene_id for branch in branches}),
+        compared_scenes=sum(len(scene) > 1 for scene in by_scene.values()),
         branches=len(branches),
         acted=wilson_interval(sum(branch.acted_w is not None for branch in branches), len(branches)),
         success=wilson_interval(sum(branch.is_success for branch in branches), len(branches)),

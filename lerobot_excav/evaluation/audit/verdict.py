@@ -46,8 +46,8 @@ def judge(found: Obedience) -> Verdict:
             verdict=OUT_OF_SUPPORT,
             reason=f"the machine acts after {acted:.0f} % of the masks only (less than {100.0 * LEAST_ACTED:.0f} %)",
         )
-    if found.scenes < LEAST_SCENES or found.slope is None:
-        few = f"{found.scenes} scenes with at least two masks to act on are too few; {LEAST_SCENES} are needed"
+    if found.compared_scenes < LEAST_SCENES or found.slope is None:
+        few = f"{found.compared_scenes} scenes with at least two masks acted on are too few; {LEAST_SCENES} are needed"
         return Verdict(verdict=UNDECIDED, reason=few)
     low, high, slope = found.slope.low, found.slope.high, found.slope.estimate
     shown = f"the slope of {slope:.2f} [{low:.2f}, {high:.2f}]"
@@ -60,4 +60,6 @@ def judge(found: Obedience) -> Verdict:
         return Verdict(verdict=INSENSITIVE, reason=f"{shown} has its interval below {INSENSITIVE_SLOPE}")
     if low > INSENSITIVE_SLOPE and high < least:
         return Verdict(verdict=PARTLY, reason=f"{shown} has its interval between {INSENSITIVE_SLOPE} and {least}")
+    if low > most:
+        return Verdict(verdict=UNDECIDED, reason=f"{shown} lies above {most}: it goes further than the masks do")
     return Verdict(verdict=UNDECIDED, reason=f"{shown} has an interval that allows for more than one verdict")

@@ -54,6 +54,7 @@ class Row(_Table):
     about: Text  # the policy, in words
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = ()  # of its trainings; their metrics are called LABEL-SEED
     paper: dict[str, float] = {}  # the paper's figures by key of their column, rates in percent
+    setting: dict[str, Text] = {}  # by header what tells the row apart, where its metrics cannot know: a withheld mask
 
     @property
     def names(self) -> tuple[str, ...]:

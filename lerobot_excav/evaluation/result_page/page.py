@@ -30,6 +30,16 @@ class PageRow(RunSummary):
     origins: dict[str, EvaluationOrigin]
 
     @property
+    def setting(self) -> dict[str, str]:
+        """What tells the row apart, by header."""
+        return self.run.setting | self.row.setting
+
+    @property
+    def seeds(self) -> str:
+        """Number of its training seeds, in words; an operator has none."""
+        return "-" if self.run.first.operator else str(len(self.run.evaluations))
+
+    @property
     def parts(self) -> list[tuple[str, Evaluation, EvaluationOrigin]]:
         """The evaluations, each with its name and where it comes from."""
         pairs = zip(self.origins.items(), self.run.evaluations, strict=True)
@@ -46,9 +56,10 @@ class PageRow(RunSummary):
 class PageDifference:
     """A row minus its reference, by measure, on the scenes that both have played, with their number."""
 
-    label: str
+    label: str  # of the row
     reference: str
     scenes: int
+    seeds: str  # of the row and of the reference
     differences: list[Difference]
 
 
@@ -91,6 +102,12 @@ class ResultPage:
         origins = [origin for row in self.rows for origin in row.origins.values()]
         trainings = [origin.training for origin in origins if origin.training is not None]
         return list({(training.name, training.steps): training for training in trainings}.values())
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether p-values are corrected for their number anywhere."""
+        compared = [row for section in self.sections for row in section.differences]
+        return any(change.p_corrected is not None for row in compared for change in row.differences)
 
     @property
     def notes(self) -> list[str]:
@@ -156,7 +173,10 @@ def _section(section: Section, rows: dict[str, PageRow]) -> PageSection:
         section=section,
         rows=present,
         missing=[name for row in section.rows for name in row.names if not _has(rows, row, name)],
-        differences=_corrected([_difference(reference.run, row.run) for row in others if reference]),
+        differences=_corrected(
+            [_difference(reference, row) for row in others if reference],
+            planned={row.label for row in section.rows} - {section.reference, section.operator},
+        ),
     )
 
 
@@ -165,33 +185,45 @@ def _has(rows: dict[str, PageRow], row: Row, name: str) -> bool:
 
 
 def _require_known_figures(section: Section, measures: TaskMeasures) -> None:
-    """Raise `ConfigurationError` unless every figure of the paper stands beside a column, also in rows not yet run."""
+    """Raise `ConfigurationError` unless all that rows say by name stands in a column, also in rows not yet run."""
     for row in section.rows:
-        for key in row.paper:
-            allowed = ", ".join(measures.compared)
-            require(key in measures.compared, f"row {row.label!r}: paper.{key} has no column; allowed: {allowed}")
+        named = [("setting", header, list(measures.setting)) for header in row.setting]
+        named += [("paper", key, list(measures.compared)) for key in row.paper]
+        for table, name, allowed in named:
+            words = f"row {row.label!r}: {table}.{name} has no column; allowed: {', '.join(allowed)}"
+            require(name in allowed, words)
 
 
-def _difference(reference: Run, run: Run) -> PageDifference:
+def _difference(reference: PageRow, row: PageRow) -> PageDifference:
     """Compare on common scenes: a row may have played fewer of them than its reference."""
-    common = set(reference.keys) & set(run.keys)
-    differences = compare(reference.only(common), run.only(common)) if common else []
-    return PageDifference(label=run.label, reference=reference.label, scenes=len(common), differences=differences)
+    common = set(reference.run.keys) & set(row.run.keys)
+    return PageDifference(
+        label=row.row.label,
+        reference=reference.row.label,
+        scenes=len(common),
+        seeds=f"{row.seeds} vs {reference.seeds}",
+        differences=compare(reference.run.only(common), row.run.only(common)) if common else [],
+    )
 
 
-def _corrected(rows: list[PageDifference]) -> list[PageDifference]:
-    """Correct p-values for the number of rows that are compared with one reference, measure by measure."""
-    compared = [row for row in rows if row.differences]
-    if len(compared) < 2:
+def _corrected(rows: list[PageDifference], *, planned: set[str]) -> list[PageDifference]:
+    """Correct p-values for the number of rows that are compared with one reference, measure by measure.
+
+    Those are all that are planned, whether they have been run or not, so that a p-value of today is not corrected
+    otherwise tomorrow. An operator is what all are related to, and none of them.
+    """
+    compared = [row for row in rows if row.differences and row.label in planned]
+    if len(planned) < 2 or not compared:
         return rows
     by_measure = zip(*(row.differences for row in compared), strict=True)
-    columns = [_with_corrected(column) for column in by_measure]
+    columns = [_with_corrected(column, family=len(planned)) for column in by_measure]
     corrected = {
         row.label: list(differences) for row, differences in zip(compared, zip(*columns, strict=True), strict=True)
     }
-    return [replace(row, differences=corrected.get(row.label, [])) for row in rows]
+    return [replace(row, differences=corrected.get(row.label, row.differences)) for row in rows]
 
 
-def _with_corrected(column: tuple[Difference, ...]) -> list[Difference]:
-    p_values = holm([difference.p_value for difference in column])
-    return [replace(change, p_corrected=p_value) for change, p_value in zip(column, p_values, strict=True)]
+def _with_corrected(column: tuple[Difference, ...], *, family: int) -> list[Difference]:
+    known = [difference.p_value for difference in column if difference.p_value is not None]
+    corrected = iter(holm(known, family=family))
+    return [change if change.p_value is None else replace(change, p_corrected=next(corrected)) for change in column]

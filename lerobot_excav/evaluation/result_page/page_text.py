@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Sequence
 
-from lerobot_excav.envs.tasks.measures import Column, Kind, TaskMeasures
+from lerobot_excav.envs.tasks.measures import Column, Kind
 from lerobot_excav.evaluation.markdown import (
     difference_cells,
     interval_text,
@@ -51,10 +51,18 @@ def page_text(page: ResultPage, *, files: Collection[str] = (), clips: Sequence[
         measures=_legend(page),
         simulations=simulations([row.run for row in page.rows]) if page.rows else "",
         versions=_versions(page),
-        seeds=sorted({len(row.run.evaluations) for row in page.rows}),
+        single=[row.row.about for row in page.rows if row.seeds == "1"],
+        has_blue=_has_blue(page),
         commands=_commands(page),
         by_hand=_by_hand(page),
     )
+
+
+def _has_blue(page: ResultPage) -> bool:
+    """Tell whether a rollout may have a blue border: its record says whether the machine did what a wrong mask said."""
+    clipped = {clips.label for clips in page.contents.clips}
+    runs = [row.run for row in page.rows if row.row.label in clipped]
+    return any(episode.obeyed_shown_mask is not None for run in runs for episode in run.episodes)
 
 
 def _tables(section: PageSection) -> Iterator[str]:
@@ -70,17 +78,17 @@ def _tables(section: PageSection) -> Iterator[str]:
         if column not in compared and any(row[column.key] is not None for row in section.rows)
     ]
     yield _table(section.rows, [(_full_header(column), _values(column, section.rows)) for column in others])
-    if lines := _differences(section, measures):
-        decisive, reference = _decisive(measures).header, section.differences[0].reference
-        header = ["setting", *measures.setting, "scenes", f"{decisive} minus `{reference}`", "p", "p, Holm"]
-        yield markdown_table(header, lines)
+    for column in compared:
+        if lines := _differences(section, column):
+            minus = f"{column.header} minus `{section.differences[0].reference}`"
+            yield markdown_table(["setting", *measures.setting, "scenes", "seeds", minus, "p", "p, Holm"], lines)
 
 
 def _table(rows: Sequence[PageRow], columns: Sequence[tuple[str, list[str]]]) -> str:
     """Lay out columns, each with its header, behind the names of the rows."""
-    names = [[row.row.about, *row.run.setting.values(), str(len(row.run.episodes))] for row in rows]
+    names = [[row.row.about, *row.setting.values(), str(len(row.run.episodes)), row.seeds] for row in rows]
     values = zip(*(cells for _, cells in columns), strict=True)
-    header = ["setting", *rows[0].run.setting, "n", *(header for header, _ in columns)]
+    header = ["setting", *rows[0].setting, "n", "seeds", *(header for header, _ in columns)]
     return markdown_table(header, [[*name, *cells] for name, cells in zip(names, values, strict=True)])
 
 
@@ -98,14 +106,14 @@ def _full_header(column: Column) -> str:
     return f"{column.header}: {' / '.join(column.words)}" if column.kind is Kind.COUNTS else column.header
 
 
-def _differences(section: PageSection, measures: TaskMeasures) -> list[list[str]]:
+def _differences(section: PageSection, column: Column) -> list[list[str]]:
     rows = {row.row.label: row for row in section.rows}
-    column = _decisive(measures)
     return [
         [
             rows[compared.label].row.about,
-            *rows[compared.label].run.setting.values(),
+            *rows[compared.label].setting.values(),
             str(compared.scenes),
+            compared.seeds,
             *difference_cells(column, difference),
             p_text(difference.p_corrected),
         ]
@@ -113,11 +121,6 @@ def _differences(section: PageSection, measures: TaskMeasures) -> list[list[str]
         for difference in compared.differences
         if difference.measure == column.key
     ]
-
-
-def _decisive(measures: TaskMeasures) -> Column:
-    """Return the first measure that is compared."""
-    return measures.column(measures.compared[0])
 
 
 def _points(page: ResultPage) -> list[list[str]]:

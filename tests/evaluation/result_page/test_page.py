@@ -49,7 +49,7 @@ def test_curves_tell_success_by_step_and_minutes(finished):
 
 def test_the_text_sets_figures_beside_the_papers_and_names_what_was_not_run(finished):
     text = page_text(make_page(finished))
-    shown = ["# Does it obey?", "Told before.", "| paired  | correct | 10 | 100.0 [72.2, 100.0] | 96"]
+    shown = ["# Does it obey?", "Told before.", "| paired  | correct | 10 | 1     | 100.0 [72.2, 100.0] | 96"]
     shown += ["| 3.0 [3.0, 3.0]", "0 / 0 / 5", "commanded / other / none", "| 200 (40 held out) | 2000  | 16"]
     shown += ["lerobot-eval --policy.path=", "seed 1000, commit 012345678", "lerobot 0.6.1", "Not run: later."]
     assert [words for words in shown if words not in text] == []
@@ -240,7 +240,13 @@ def test_seeds_of_a_row_are_one_run_and_those_not_run_are_named(seeded):
     assert (mask.counts["episodes"], mask["target_success"].estimate) == (40, 39 / 40)
     assert list(mask.origins) == ["mask-1", "mask-2"]
     text = page_text(page)
-    assert "Training seeds per row: 1 to 2." in text
+    assert "Of a single training, so that its intervals do not say how trainings differ: no mask.\n" in text
+    table = text.split("\n\n")[2].splitlines()
+    cells = [[cell.strip() for cell in line.strip("| ").split("|")] for line in table]
+    column = cells[0].index("seeds")
+    assert {line[0]: line[column] for line in cells[2:]} == {
+        "paired": "2", "non-paired": "2", "no mask": "1", "operator": "-",
+    }  # fmt: skip
     assert "Not run: mask-3." in text
     assert "# mask-2, seed " in text
 
@@ -256,14 +262,42 @@ def test_efficiencies_are_related_to_the_operator_of_the_section(seeded):
 def test_p_values_are_corrected_for_the_rows_that_are_compared(seeded):
     (section,) = make_page(seeded).sections
     near, none, operator = (row.differences[0] for row in section.differences)
-    p_values = sorted((near.p_value, none.p_value, operator.p_value))
-    corrected = sorted((near.p_corrected, none.p_corrected, operator.p_corrected))
-    assert corrected[0] == pytest.approx(3 * p_values[0])
+    p_values = sorted((near.p_value, none.p_value))
+    corrected = sorted((near.p_corrected, none.p_corrected))
+    assert corrected[0] == pytest.approx(2 * p_values[0])
     assert max(near.p_corrected, none.p_corrected) < 0.01
-    assert operator.p_corrected > 0.05
+    assert operator.p_corrected is None  # all are related to it, and it was not chosen among them
     rate = make_page(seeded).rows[0]["target_success"]
     assert rate.low < 0.9  # as twenty scenes allow, though both trainings hit nearly always
     assert rate.high == 1.0
+
+
+def test_p_values_are_corrected_for_rows_that_are_planned_and_not_run_yet(seeded, tmp_path):
+    before = make_page(seeded).sections[0].differences[0].differences[0]
+    shutil.rmtree(tmp_path / "test" / "none-1")
+    (section,) = make_page(seeded).sections
+    near, _ = (row.differences[0] for row in section.differences)
+    assert near.p_value == before.p_value
+    assert near.p_corrected == pytest.approx(2 * near.p_value)
+    assert "those not run yet among them" in page_text(make_page(seeded))
+
+
+def test_every_measure_that_decides_is_compared_in_a_table_of_its_own(seeded):
+    text = page_text(make_page(seeded))
+    for measure in ("target success [%]", "full success [%]", "retained [kg]"):
+        (header,) = (line for line in text.splitlines() if f"{measure} minus `mask`" in line)
+        assert [cell.strip() for cell in header.split("|")[4:6]] == ["scenes", "seeds"]
+    for seeds in ("2 vs 2", "1 vs 2", "- vs 2"):
+        assert text.count(f"| {seeds} |") == 3
+
+
+def test_a_row_says_what_its_metrics_cannot_know(seeded, read_rows):
+    text = SEEDED.replace('about = "no mask",', 'about = "no mask", setting = { mask = "withheld" },')
+    page = make_page(read_rows(text))
+    assert [row.setting["mask"] for row in page.rows] == ["correct", "correct", "withheld", "correct"]
+    assert page_text(page).count("withheld") == 5  # in each of its tables
+    with pytest.raises(ConfigurationError, match=r"'none': setting\.mood has no column; allowed: soil, mask"):
+        make_page(read_rows(text.replace("{ mask", "{ mood")))
 
 
 def test_copies_of_several_seeds_make_the_same_page_again(seeded, tmp_path, read_rows):

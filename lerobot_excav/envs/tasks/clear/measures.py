@@ -181,23 +181,34 @@ def _legend(operator: str | None) -> list[str]:
     return [*lines, f"Efficiency: pile removed over the operator's on the same scenes; operator: {operator}."]
 
 
+PERCENT = (0.0, 100.0)
+"""Bounds of shares in percent."""
+
 CLEAR_MEASURES = TaskMeasures(
     record=ClearRecord,
     settings={"soil": "soils", "fidelity": "fidelities", "keep_out": "keep-out zones"},
     shared={},
     setting={"soil": "soil", "mask": "mask"},
     columns=(
-        Column(key="pile_removed", header="pile removed [%]", kind=Kind.MEAN, field="pile_removed_percent"),
+        Column(
+            key="pile_removed", header="pile removed [%]", kind=Kind.MEAN, field="pile_removed_percent", bounds=PERCENT
+        ),
         Column(key="success", header="success [%]", kind=Kind.RATE, field="is_success"),
         Column(key="efficiency", header="efficiency [%]", kind=Kind.RATIO, field="pile_removed"),
         Column(key="cycles", header="cycles", kind=Kind.MEAN, field="cycle_count"),
         Column(key="mass_per_cycle_kg", header="retained a cycle [kg]", kind=Kind.MEAN, field="mass_per_cycle_kg"),
         Column(
-            key="target_success", header="target success [% of cycles]", kind=Kind.MEAN, field="target_success_percent"
+            key="target_success",
+            header="target success [% of cycles]",
+            kind=Kind.MEAN,
+            field="target_success_percent",
+            bounds=PERCENT,
         ),
-        Column(key="complete", header="dumped [% of cycles]", kind=Kind.MEAN, field="complete_percent"),
-        Column(key="timed_out", header="timed out [% of cycles]", kind=Kind.MEAN, field="timed_out_percent"),
-        Column(key="spill", header="spill [% of cycles]", kind=Kind.MEAN, field="spill_percent"),
+        Column(key="complete", header="dumped [% of cycles]", kind=Kind.MEAN, field="complete_percent", bounds=PERCENT),
+        Column(
+            key="timed_out", header="timed out [% of cycles]", kind=Kind.MEAN, field="timed_out_percent", bounds=PERCENT
+        ),
+        Column(key="spill", header="spill [% of cycles]", kind=Kind.MEAN, field="spill_percent", bounds=PERCENT),
         Column(key="hard_contact", header="hard contact [%]", kind=Kind.RATE, field="has_hard_contact"),
         Column(
             key="commonest_failure",
@@ -208,7 +219,8 @@ CLEAR_MEASURES = TaskMeasures(
         ),
     ),
     compared=("pile_removed", "success"),
-    world="dug {soil} within {episode_length} frames in version {simulation_version} of the simulation",
+    world="dug {soil} at {fidelity} fidelity within {episode_length} frames, with keep-out zones {keep_out!r}, in "
+    "version {simulation_version} of the simulation",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
     outcome=clear_outcome,

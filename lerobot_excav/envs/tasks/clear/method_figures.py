@@ -34,7 +34,10 @@ def draw_progress(methods: Methods, path: Path) -> None:
         (line,) = axes.plot(removed.mean(axis=0), marker=".", label=f"{name} (n = {len(piles)})")
         low, high = np.percentile(removed, [25.0, 75.0], axis=0)
         axes.fill_between(range(CYCLES + 1), low, high, color=line.get_color(), alpha=0.15, linewidth=0.0)
-    axes.set(xlabel="cycles", ylabel="pile removed [%]", xlim=(0, CYCLES), ylim=(0, 100))
+    axes.set(
+        xlabel="cycles", ylabel="pile removed [%]", xlim=(0, CYCLES), xticks=range(0, CYCLES + 1, 2), ylim=(0, 100)
+    )
+    axes.set_title("mean of the piles; shaded: their middle half", fontsize=8)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     _save(figure, path)
@@ -57,19 +60,26 @@ def draw_failures(methods: Methods, path: Path) -> None:
         label = "as commanded" if kind == NO_FAILURE else kind
         axes.barh(list(methods), share, left=start, label=label)
     axes.invert_yaxis()
-    axes.set(xlabel="cycles [%]", xlim=(0, 100))
+    axes.set(xlabel="cycles of a pile [%], mean of the piles", xlim=(0, 100))
     figure.legend(fontsize=8, loc="outside lower center", ncols=4)
     _save(figure, path)
 
 
 def failure_shares(piles: Sequence[ClearRecord]) -> list[float]:
-    """Return which part of the cycles went as commanded, and which failed in each of the ways of `FAILURES`."""
-    counts = Counter(cycle.failure for pile in piles for cycle in pile.cycles)
-    return [counts[kind] / max(counts.total(), 1) for kind in (NO_FAILURE, *FAILURES)]
+    """Return which part of the cycles went as commanded, and which failed in each of the ways of `FAILURES`.
+
+    Means over the piles that have cycles, each with the same weight, as in tables.
+    """
+    counts = [Counter(cycle.failure for cycle in pile.cycles) for pile in piles if pile.cycles]
+    shares = [[count[kind] / count.total() for kind in (NO_FAILURE, *FAILURES)] for count in counts]
+    return [float(share) for share in np.mean(shares, axis=0)] if shares else [0.0] * (1 + len(FAILURES))
 
 
 def draw_same_pile(methods: Methods, path: Path) -> None:
-    """Draw where every method dug on the first pile that all of them have cleared; nothing if there is none."""
+    """Draw where every method dug on the first pile that all of them have cleared; nothing if there is none.
+
+    Of a method with several trainings the first one is shown.
+    """
     shared = set.intersection(*({pile.key for pile in piles} for piles in methods.values()))
     figure = _figure(4.2 * len(methods), 4.6)
     if not shared:
@@ -77,8 +87,10 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
     else:
         panels = figure.subplots(1, len(methods), squeeze=False)[0]
         for axes, (name, piles) in zip(panels, methods.items(), strict=True):
-            draw_pile(axes, next(pile for pile in piles if pile.key == min(shared)))
-            axes.set_title(f"{name}\n{axes.get_title()}", fontsize=8)
+            first, *others = [pile for pile in piles if pile.key == min(shared)]
+            draw_pile(axes, first)
+            which = f", first of {1 + len(others)} trainings" if others else ""
+            axes.set_title(f"{name}{which}\n{axes.get_title()}", fontsize=8)
     _save(figure, path)
 
 

@@ -81,7 +81,7 @@ SCOOP_MEASURES = TaskMeasures(
         Column(key="spill", header="spill [%]", kind=Kind.RATE, field="has_spill"),
     ),
     compared=("target_success", "full_success", "retained_mass_kg"),
-    world="dug {soil} in version {simulation_version} of the simulation",
+    world="dug {soil} at {fidelity} fidelity in version {simulation_version} of the simulation",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
     outcome=scoop_outcome,
