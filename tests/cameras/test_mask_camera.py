@@ -143,7 +143,26 @@ def test_the_mask_stays_until_the_command_changes(connected, tmp_path, monkeypat
         camera.read()
 
 
-def test_a_mask_is_snapped_if_the_camera_says_so(connected, monkeypatch):
+def drawn(path, left):
+    """Write a file of one mask, half as wide and high as the picture, that begins at a share of its width."""
+    corners = [[left, 0.25], [left + 0.5, 0.25], [left + 0.5, 0.75], [left, 0.75]]
+    path.write_text(f'[[mask]]\nkey = "live"\npolygon = {corners}\n')
+    return path
+
+
+def test_the_mask_is_made_again_when_its_file_changes(connected, tmp_path):
+    path = drawn(tmp_path / "live.toml", 0.25)
+    camera = connected(f"source: manual, options: {path}")["target_mask"]
+    first = camera.read()
+    assert np.array_equal(camera.read(), first)
+    drawn(path, 0.5)
+    assert np.array_equal(camera.read(), np.roll(first, WIDTH // 4, axis=1))
+    path.unlink()
+    with pytest.raises(ConfigurationError, match="of the mask camera cannot be read"):
+        camera.read()
+
+
+def test_a_mask_is_snapped_if_the_camera_says_so(connected, tmp_path, monkeypatch):
     class Aside:
         """Snaps each mask one pixel to the right."""
 
@@ -151,11 +170,12 @@ def test_a_mask_is_snapped_if_the_camera_says_so(connected, monkeypatch):
             return replace(mask, pixels=np.roll(mask.pixels, 1, axis=1))
 
     monkeypatch.setattr("lerobot_excav.envs.masks.snapped.Snapper", Aside)
-    plain = connected("source: colour_of_words, text: red")
+    path = drawn(tmp_path / "live.toml", 0.25)
+    plain = connected(f"source: manual, options: {path}")
     shown = plain["target_mask"].read()
     for camera in plain.values():
         camera.disconnect()
-    snapped = connected("source: colour_of_words, text: red, snap: true")["target_mask"].read()
+    snapped = connected(f"source: manual, options: {path}, snap: true")["target_mask"].read()
     assert np.array_equal(snapped, np.roll(shown, 1, axis=1))
 
 

@@ -14,6 +14,8 @@ import numpy as np
 from draccus.utils import DraccusException
 from lerobot.configs import FeatureType, NormalizationMode, PolicyFeature
 
+from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
+from lerobot_excav.cameras.stream_camera.config_stream_camera import StreamCameraConfig
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.configs.excavator import ExcavatorEnvConfig
 from lerobot_excav.envs.configs.fr5_grasp import FR5GraspEnvConfig
@@ -434,7 +436,33 @@ SOIL_TABLE = {
 
 cameras = Rule(lambda v: isinstance(v, dict) and not v, ({},))  # LeRobot's own; those of this package check themselves
 
+PICTURES = {"width": whole(1, 8192), "height": whole(1, 8192), "fps": whole(1, 1000)}
+
 CONFIGURATIONS = {
+    "stream camera": (
+        StreamCameraConfig,
+        {
+            **PICTURES,
+            "name": text._replace(allows=lambda v: text.allows(v) and v.isprintable() and len(v) < 32),
+            "port": whole(1, 65535),
+            "host": text,
+            **dict.fromkeys(("timeout_s", "max_age_s"), number(high=600, above=0)),
+        },
+        {"name": "main", "port": 47501, "width": 128, "height": 96, "fps": 10},
+    ),
+    "mask camera": (
+        MaskCameraConfig,
+        {
+            **PICTURES,
+            "of": text,
+            "source": one_of("oracle", "click", "geometry", "manual", "grounded_sam"),
+            "options": optional(text),
+            "text": optional(text),
+            "command": optional(path),
+            "snap": flag,
+        },
+        {"of": "top", "source": "manual", "width": 128, "height": 96},
+    ),
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
     "excavator": (
         ExcavatorEnvConfig,

@@ -6,10 +6,14 @@ from pathlib import Path
 from lerobot.cameras import CameraConfig
 
 from lerobot_excav.envs.masks.source import chooses_target, mask_source_names
-from lerobot_excav.errors import require, require_choice
+from lerobot_excav.errors import require
+from lerobot_excav.setting import check_settings, setting
 
 ANY_FPS = 30
 """Rate that is told [1/s] (kind: guess): LeRobot's robots demand one of every camera, and a mask is read at any."""
+
+MOST_PX = 8192
+"""Greatest side of a picture [px] (kind: guess)."""
 
 
 @CameraConfig.register_subclass("mask")
@@ -17,35 +21,33 @@ ANY_FPS = 30
 class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """The target mask of a shared camera, as one more camera of a robot; its class needs no change.
 
-    Attributes:
-        of: Name of the shared camera.
-        source: Mask source: `grounded_sam`, `manual`, or one of another package that needs a picture only.
-        options: TOML file of what the source is told.
-        text: What to look for, before what the options say.
-        command: Text file that holds what to look for; whenever it changes, the mask is made again.
-        snap: Whether each mask is snapped onto the object under its middle, by the small network of `mask_snap`.
-
     Raises:
         ConfigurationError: There is no such source, it chooses targets itself, or the size is missing.
     """
 
-    of: str
-    source: str
-    options: str | None = None
-    text: str | None = None
-    command: Path | None = None
-    snap: bool = False
-    fps: int | None = ANY_FPS
+    of: str = setting("Name of the shared camera at whose pictures the source looks")
+    source: str = setting(
+        "What makes the mask: click, manual, grounded_sam, or a source of another package that needs a picture only",
+        choices=mask_source_names,
+    )
+    options: str | None = setting(
+        "TOML file of what the source is told; whenever it changes, the mask is made again", default=None
+    )
+    text: str | None = setting("What to look for, before what the options say", default=None)
+    command: Path | None = setting(
+        "Text file that holds what to look for; whenever it changes, the mask is made again", default=None
+    )
+    snap: bool = setting(
+        "Whether a small network marks the object under the middle of the mask, and that is taken in its place",
+        default=False,
+    )
+    width: int = setting("Width of the shared camera's pictures [px]", low=1, high=MOST_PX)
+    height: int = setting("Height of the shared camera's pictures [px]", low=1, high=MOST_PX)
+    fps: int = setting("Rate that robots are told [1/s]; a mask is read at any", default=ANY_FPS, low=1, high=1000)
 
     def __post_init__(self) -> None:
-        require_choice("source of a mask camera", self.source, mask_source_names())
-        require(
-            not chooses_target(self.source), f"source={self.source} of a mask camera chooses where to act by itself"
-        )
-        require(
-            self.width is not None and self.height is not None,
-            f"the mask camera of {self.of!r} needs width and height, those of that camera: robots ask for them first",
-        )
+        check_settings(self, "mask camera: ")
+        require(not chooses_target(self.source), f"mask camera: source={self.source} chooses where to act by itself")
         require(
             self.text is None or self.command is None,
             "text and command of a mask camera both say what to look for; give one of them",

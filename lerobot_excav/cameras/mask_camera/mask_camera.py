@@ -1,6 +1,7 @@
 """The mask camera itself."""
 
-from typing import Any, override
+from pathlib import Path
+from typing import Any, NamedTuple, override
 
 import numpy as np
 from lerobot.cameras import Camera
@@ -18,17 +19,25 @@ KEY = "live"
 """By which a file of masks names what this camera sees."""
 
 
+class _Told(NamedTuple):
+    """What a mask camera was told."""
+
+    words: str | None
+    options: bytes | None
+
+
 class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Delivers one mask until its command changes: it is made of the picture that the shared camera shows then.
 
-    The first mask is made of the first picture, which may take a while; after that a read costs nothing.
+    What counts as the command are the words and the file of options. The first mask is made of the first picture, which
+    may take a while; after that a read costs nothing.
     """
 
     def __init__(self, config: MaskCameraConfig) -> None:
         super().__init__(config)
         self.config = config
         self._is_connected = False
-        self._told: str | None = None
+        self._made_for: _Told | None = None
         self._mask: NDArray[np.uint8] | None = None
 
     @property
@@ -58,14 +67,15 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         Raises:
             DeviceError: The camera or the shared one is not connected.
             MaskMissingError: The source finds nothing, so that a policy would act without a target.
-            ConfigurationError: The command file cannot be read, or the shared camera has another size.
+            ConfigurationError: The file of the command or of the options cannot be read, or the shared camera has
+                another size.
         """
         if not self._is_connected:
             raise DeviceError(f"the mask camera of {self.config.of!r} is not connected; call connect() first")
-        told = self._read_command()
-        if self._mask is None or told != self._told:
-            self._mask = self._make(told)
-            self._told = told
+        told = _Told(words=self._read_command(), options=self._read_options())
+        if self._mask is None or told != self._made_for:
+            self._mask = self._make(told.words)
+            self._made_for = told
         return self._mask.copy()
 
     @override
@@ -86,6 +96,16 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigurationError(
                 f"command={self.config.command} of the mask camera cannot be read ({error}); write the target into it"
+            ) from error
+
+    def _read_options(self) -> bytes | None:
+        if self.config.options is None:
+            return None
+        try:
+            return Path(self.config.options).read_bytes()
+        except OSError as error:
+            raise ConfigurationError(
+                f"options={self.config.options} of the mask camera cannot be read ({error}); write the target into it"
             ) from error
 
     def _make(self, told: str | None) -> NDArray[np.uint8]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from lerobot.cameras import CameraConfig
 
 from lerobot_excav.errors import require
+from lerobot_excav.setting import check_settings, setting
 
 
 @CameraConfig.register_subclass("shared")
@@ -22,13 +23,11 @@ class SharedCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's class
         ConfigurationError: The name is empty, or a size is given that is another than the camera's.
     """
 
-    name: str
-    camera: CameraConfig
+    name: str = setting("Name under which mask cameras know it, as `of`")
+    camera: CameraConfig = setting("The camera itself, of any type of LeRobot")
 
     def __post_init__(self) -> None:
-        require(
-            bool(self.name), "name='' of a shared camera is not possible; give one, which the mask camera names as `of`"
-        )
+        check_settings(self, "shared camera: ")
         for field in ("fps", "width", "height"):
             own, given = getattr(self.camera, field), getattr(self, field)
             require(

@@ -119,8 +119,9 @@ class TaskSettings:
         "Stream of scenes; they share none, and reports are made of test", default="train", choices=SCENE_SETS
     )
     mask_source: str = setting(
-        "What makes the target mask: oracle, which knows the scene; geometry, which looks at depth; manual, masks from "
-        "a file; grounded_sam, from words; vlm_dig, a model that chooses where to dig; or a source of another package",
+        "What makes the target mask: oracle, which knows the scene; geometry, which looks at depth; click, a network "
+        "at a clicked pixel; manual, masks from a file; grounded_sam, from words; vlm_dig, a model that chooses "
+        "where to dig; or a source of another package",
         default="oracle",
         choices=mask_source_names,
     )
