@@ -70,6 +70,7 @@ def test_the_page_shows_views_targets_and_the_legend_of_the_sticks(open_page, tm
         page.screenshot(path=tmp_path / f"{scheme}_{width}.png", full_page=True)
 
 
+@pytest.mark.slow
 def test_a_gamepad_drives_a_whole_cycle_as_the_operator_does(open_page):
     """Played from a plan, nobody corrects what comes late: on a busy machine the slower second try counts."""
     assert any(_drives_a_cycle(open_page, speed) for speed in (0.5, 0.2))

@@ -66,6 +66,14 @@ def assert_only_mask_differs(shown, right):
     assert [key for key, array in shown.items() if not np.array_equal(array, right[key])] == ["pixels/target_mask"]
 
 
+# The masks and scenes of Clear-v0 are made by the code of Scoop-v0, where the quick tier tests them.
+of_masks_and_scenes = pytest.mark.parametrize(
+    "gym_id",
+    [pytest.param(each, marks=pytest.mark.slow if each.endswith("/Clear-v0") else ()) for each in GYM_IDS],
+    indirect=True,
+)
+
+
 @pytest.fixture(scope="module", params=GYM_IDS)
 def gym_id(request):
     return request.param
@@ -157,11 +165,13 @@ def test_the_mask_is_black_and_white_and_shows_something(right):
     assert (mask == mask[..., :1]).all()
 
 
+@of_masks_and_scenes
 @pytest.mark.parametrize("condition", ["zero", "random", "mismatched"])
 def test_a_mask_condition_changes_the_mask_alone(gym_id, right, condition):
     assert_only_mask_differs(start_of(gym_id, mask_condition=condition), right)
 
 
+@of_masks_and_scenes
 @pytest.mark.parametrize(("noise", "growth"), [("shift", 0), ("erode", -1), ("dilate", 1)])
 def test_mask_noise_changes_the_mask_alone(gym_id, right, noise, growth):
     shown, again = (start_of(gym_id, mask_noise=noise, mask_noise_px=2) for _ in range(2))
@@ -180,6 +190,7 @@ def flickering_masks(gym_id):
     return masks
 
 
+@of_masks_and_scenes
 def test_a_mask_that_flickers_lies_elsewhere_at_every_frame_and_is_the_same_again(gym_id, trace):
     masks, again = flickering_masks(gym_id), flickering_masks(gym_id)
     assert all(map(np.array_equal, masks, again))
@@ -207,6 +218,7 @@ def test_impossible_settings_are_refused(gym_id, settings, named):
         gym.make(gym_id, **settings)
 
 
+@of_masks_and_scenes
 def test_scene_sets_hold_other_scenes(gym_id):
     starts = [start_of(gym_id, scene_set=scene_set)["pixels/main"] for scene_set in ("train", "val", "test")]
     assert len({start.tobytes() for start in starts}) == 3

@@ -95,7 +95,7 @@ def copy_frames(episode, source, frames=slice(None)):
     ],
 )
 def test_what_is_wrong_is_found(tampered, key, change, expected):
-    found = problems(tampered(key, change), replays=19)
+    found = problems(tampered(key, change), episodes=range(3, 11), replays=8)
     assert found.keys() == expected.keys()
     assert all(found[episode].startswith(problem) for episode, problem in expected.items())
 
