@@ -12,7 +12,7 @@ source "$(dirname "$0")/own_folder.sh"
 
 say "1/4  Recording up to 4 paired demonstrations of $SCENES piles at stages $STAGES -> $OUT/dataset"
 [ -d "$OUT/dataset" ] || lerobot-excav demos --env.type=excavator --scenes="$SCENES" --stages="$STAGES" --targets=4 \
-  --out="$OUT/dataset" --resume=true
+  --keep_failures=true --storage=video --out="$OUT/dataset" --resume=true
 
 say "2/4  Looking at what was recorded"
 lerobot-excav qc "$OUT/dataset"

@@ -32,16 +32,17 @@ COMMANDS = {
 
 EPILOG = """\
 a first round:
-  lerobot-excav demos --env.type=excavator --scenes=50 --targets=4 --out=outputs/digging
-  lerobot-excav qc outputs/digging
-  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.target_token=true \\
-      --policy.chunk_size=10 --policy.actions_per_token=1 --policy.push_to_hub=false \\
-      --dataset.repo_id=local/digging --dataset.root=outputs/digging --batch_size=16 --num_workers=1 \\
-      --output_dir=outputs/train --eval_steps=500 \\
-      $(lerobot-excav index outputs/digging --split=scene --flags)
-  lerobot-eval --policy.path=outputs/train/checkpoints/last/pretrained_model --env.type=excavator \\
-      --env.scene_set=test --env.metrics_path=outputs/metrics.jsonl --eval.n_episodes=40
-  lerobot-excav report outputs/metrics.jsonl
+  lerobot-excav demos --env.type=excavator --scenes=30 --stages=0,1-13 --targets=4 --keep_failures=true \\
+      --storage=video --out=outputs/paired
+  lerobot-excav qc outputs/paired
+  lerobot-train --policy.type=mask_act --policy.preset=fast --policy.n_encoder_layers=1 --policy.target_token=true \\
+      --policy.chunk_size=10 --policy.n_action_steps=5 --policy.actions_per_token=1 --policy.device=cpu \\
+      --policy.push_to_hub=false --dataset.repo_id=local/paired --dataset.root=outputs/paired --batch_size=16 \\
+      --steps=7500 --num_workers=1 --save_freq=1500 --output_dir=outputs/train
+  lerobot-eval --policy.path=outputs/train/checkpoints/last/pretrained_model --policy.device=cpu \\
+      --env.type=excavator --env.scene_set=test --env.metrics_path=outputs/metrics.jsonl \\
+      --eval.n_episodes=20 --eval.batch_size=1
+  lerobot-excav report outputs/metrics.jsonl --out=outputs/report
 
 `lerobot-excav COMMAND --help` explains a command.
 """

@@ -13,7 +13,7 @@ IMAGE = Path("images", "rate_and_delay.png")
 
 _HEAD = """# Frame rate and delay
 
-Written by `python -m validation.operator_delay`; do not edit it.
+Written by `python -m validation.operator_delay --scoops={n}`; do not edit it.
 
 The scripted operator looks and commands at some rate, and each command reaches the machine late by some time; it knows
 nothing of the delay. A command holds until the next one, so at 10 a second the machine already acts on a look that is
