@@ -24,29 +24,35 @@ def until(condition, limit_s=20.0):
 
 
 @contextmanager
-def emulated(settings=None, **machine):
+def emulated(settings=None, port=0, **machine):
     """Run a machine without soak; its metrics are collected in `cycles`."""
     cycles, over = [], threading.Event()
     machine = {"soak_s": 0.0, "valves": Valves(lag_s=0.05), "pictures_hz": 10, **machine}
     site = EmulatedSite(
         ExcavatorSettings(**{**SMALL, "scene_set": "train", **(settings or {})}),
         EmulatedMachine(**machine),
+        ports=(port, 0),
         on_over=cycles.append,
     )
     thread = threading.Thread(target=site.emulator.run, args=(over.is_set,), daemon=True)
     thread.start()
+
+    def stop():
+        if not over.is_set():
+            over.set()
+            thread.join(timeout=20.0)
+            site.close()
+
     try:
-        yield SimpleNamespace(emulator=site.emulator, site=site, cycles=cycles)
+        yield SimpleNamespace(emulator=site.emulator, site=site, cycles=cycles, stop=stop)
     finally:
-        over.set()
-        thread.join(timeout=20.0)
-        site.close()
+        stop()
 
 
 @contextmanager
-def linked(served, dead_man=None, hold_s=STALE_S):
+def linked(served, dead_man=None, hold_s=STALE_S, **options):
     """Open a wire to a machine."""
-    link = HostLink(served.emulator.address, dead_man=dead_man or AlwaysHeld(), hold_s=hold_s)
+    link = HostLink(served.emulator.address, dead_man=dead_man or AlwaysHeld(), hold_s=hold_s, **options)
     link.connect()
     try:
         yield link
