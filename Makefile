@@ -78,8 +78,10 @@ test: $(READY) ## run the test suite, but for what is marked slow (ten minutes)
 test-all: $(READY) ## run the whole suite (half an hour)
 	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python $(PYTEST)
 
-test-cluster: $(READY) ## start a SLURM of two nodes here, kill one at work, compare results (15 minutes; needs slurm-wlm, munge)
+test-cluster: $(READY) ## start a SLURM of two nodes here, kill one at work, compare results (15 minutes; installs slurm-wlm and munge as root)
 	@command -v slurmd >/dev/null && command -v munged >/dev/null || { \
+	  test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get update -qq && \
+	  apt-get install -y -qq --no-install-recommends slurm-wlm munge; } || { \
 	  echo "make: slurmd or munged is not here; Debian, Ubuntu: sudo apt-get install --no-install-recommends slurm-wlm munge"; exit 1; }
 	@OMP_NUM_THREADS=1 LP_NUM_THREADS=1 $(RUN)/python -m pytest tests/cluster/test_*.py
 

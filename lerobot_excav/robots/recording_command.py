@@ -6,7 +6,7 @@ refused command leaves nothing behind.
 
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,25 @@ def require_fitting_command(robot_config: Any) -> Any | None:
     return command
 
 
+def require_command_for_machine(robot_config: Any, *, rates: Sequence[int], has_mask: bool) -> None:
+    """Check that the command drives a machine at one of its rates, and stores its mask, if it has one, as it is.
+
+    Raises:
+        ConfigurationError: It does not; the message holds the flags to add.
+    """
+    command = holder_of(robot_config, "robot")
+    if command is None:
+        return
+    faults = [*_rates_beside(command, rates), *(_blurred_mask(command) if has_mask else ())]
+    if faults:
+        allowed = ", ".join(map(str, rates))
+        raise ConfigurationError(
+            f"this command does not fit the machine, which takes {allowed} actions a second: "
+            f"{'; '.join(fault for fault, _ in faults)}. Nothing was recorded or moved. "
+            f"Give {' '.join(flag for _, flag in faults)}"
+        )
+
+
 def operator_of(command: Any) -> str | None:
     """Return who commands by a command of LeRobot, `policy` or `person`; a scripted operator says so itself."""
     if hasattr(command, "strategy"):  # lerobot-rollout
@@ -99,6 +118,25 @@ def _wrong_rates(command: Any, fps: int) -> Iterator[tuple[str, str]]:
     replayed = _replayed_rate(command)
     if replayed not in (None, fps):
         yield f"the dataset was recorded at {replayed} frames a second", f"--robot.fps={replayed}"
+
+
+def _rates_beside(command: Any, rates: Sequence[int]) -> Iterator[tuple[str, str]]:
+    """Yield every rate of the command that is none of a machine's, in words, and the flag that mends it."""
+    times = getattr(command, "interpolation_multiplier", 1)
+    sent = getattr(command, "fps", None)
+    recorded = recorded_dataset(command)
+    if sent is not None and sent * times not in rates:
+        flags = "--interpolation_multiplier=1 " * (times != 1)
+        yield f"it sends {sent * times:g}", f"{flags}--fps={_nearest(sent * times, rates)}"
+    if recorded is not None and recorded.fps not in rates:
+        yield f"it records {recorded.fps} frames a second", f"--dataset.fps={_nearest(recorded.fps, rates)}"
+    replayed = _replayed_rate(command)
+    if replayed is not None and replayed not in rates:
+        yield f"the dataset was recorded at {replayed} frames a second", "a recording at one of its rates"
+
+
+def _nearest(rate: float, rates: Sequence[int]) -> int:
+    return min(rates, key=lambda each: abs(each - rate))
 
 
 def _blurred_mask(command: Any) -> Iterator[tuple[str, str]]:

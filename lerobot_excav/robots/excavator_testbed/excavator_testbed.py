@@ -15,18 +15,23 @@ from lerobot_excav.errors import DeviceError
 from lerobot_excav.robots.excavator_testbed.alignment import Ages, AlignmentLog
 from lerobot_excav.robots.excavator_testbed.command_lapse import CommandLapse
 from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
+from lerobot_excav.robots.recording_command import require_command_for_machine
 from lerobot_excav.robots.recording_phases import RecordingPhases
 from lerobot_excav.robots.session_log import default_path
 from lerobot_excav.robots.simulated_robot import command_from_action
 from lerobot_excav.testbed.dead_man import AlwaysHeld, DeadMan, GamepadButton
 from lerobot_excav.testbed.host_link import Heard, HostLink
-from lerobot_excav.testbed.protocol import REFUSAL_WORDS, Refusal, StateFlag
+from lerobot_excav.testbed.protocol import RATE_HZ, REFUSAL_WORDS, Refusal, StateFlag
 from lerobot_excav.testbed.safety import STALE_S, STILL
 
 logger = logging.getLogger(__name__)
 
 # Until a machine is ready it has to see centred sticks, whatever a policy wants.
 NOT_READY = (Refusal.EMERGENCY_STOP, Refusal.NOT_HEARD, Refusal.SOAK, Refusal.START_GATE)
+
+FRAME_RATES = tuple(rate for rate in range(1, RATE_HZ + 1) if RATE_HZ % rate == 0 and rate * STALE_S > 1.0)
+"""Frames a second that a loop may have: they divide the rate of datagrams, so that every action is sent equally often,
+and a frame is shorter than a command counts."""
 
 _WORDS_EVERY_S = 5.0
 
@@ -41,6 +46,10 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
     Attributes:
         cameras: The cameras by name.
         link: The wire.
+
+    Raises:
+        ConfigurationError: The command of LeRobot that makes it has another rate than `FRAME_RATES`, or records masks
+            in lossy videos.
     """
 
     config_class = ExcavatorTestbedConfig
@@ -49,6 +58,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
     def __init__(self, config: ExcavatorTestbedConfig) -> None:
         super().__init__(config)
         self.config = config
+        require_command_for_machine(config, rates=FRAME_RATES, has_mask="target_mask" in config.cameras)
         self.cameras = make_cameras_from_configs(config.cameras)
         self.link: HostLink | None = None
         self._heard: Heard | None = None
