@@ -64,12 +64,14 @@ def make_masks(
         info.spec.make_settings(mask_snap=True)  # refused where there is nothing to snap to
     made = make_mask_source(source, options=options, text=text)
     made = SnappedMasks(made) if snap else made
-    settings = {
-        **{"source": source, "options": options, "text": text, "dataset": root.name, "main_camera": main_camera},
+    told = {
+        "source": source,
+        "options": options,
+        "text": text,
+        "main_camera": main_camera,
         **({"snap": True} if snap else {}),
-        "told": None if options is None else _digest([Path(options)]),
-        "episodes": _digest([root / INFO_PATH, *sorted(root.glob("meta/episodes/*/*.parquet"))]),
     }
+    settings = _settings(root, told)
     episodes = (
         _of_ours(root, info, made) if is_ours else _of_others(root, info, made, main_camera or camera_key("main"))
     )
@@ -126,6 +128,17 @@ def _of_others(root: Path, info: DatasetInfo, source: MaskSource, camera: str) -
 
 def _of_picture(view: Callable[[int], PictureView], index: int, source: MaskSource) -> list[FoundMask]:
     return recorded_pictures.find_masks(view(index), source, index)
+
+
+def _settings(root: Path, told: dict[str, Any]) -> dict[str, Any]:
+    """Return all that decides about the masks: what was told, and digests of the files that it names."""
+    options = told["options"]
+    return {
+        **told,
+        "dataset": root.name,
+        "told": None if options is None else _digest([Path(options)]),
+        "episodes": _digest([root / INFO_PATH, *sorted(root.glob("meta/episodes/*/*.parquet"))]),
+    }
 
 
 def _digest(paths: Sequence[Path]) -> str:
