@@ -64,24 +64,17 @@ def make_masks(
         info.spec.make_settings(mask_snap=True)  # refused where there is nothing to snap to
     made = make_mask_source(source, options=options, text=text)
     made = SnappedMasks(made) if snap else made
-    told = {
-        "source": source,
-        "options": options,
-        "text": text,
-        "main_camera": main_camera,
-        **({"snap": True} if snap else {}),
-    }
-    settings = _settings(root, told)
+    told: dict[str, Any] = {"source": source, "options": options, "text": text, "main_camera": main_camera}
+    settings = _settings(root, told | ({"snap": True} if snap else {}))
     episodes = (
         _of_ours(root, info, made) if is_ours else _of_others(root, info, made, main_camera or camera_key("main"))
     )
     with FoundMasks(out, settings) as found:
-        bar = tqdm(total=info.total_episodes, desc="masks", unit="episode", disable=not show_progress)
-        for index, find in episodes:
+        for index, find in tqdm(
+            episodes, total=info.total_episodes, desc="masks", unit="episode", disable=not show_progress
+        ):
             if index not in found.episodes:
                 found.add(index, find())
-            bar.update()
-        bar.close()
         with workspace(beside=out) as folder:
             write_with_masks(root, folder / "dataset", found.episodes, _provenance(settings))
             if is_ours:
