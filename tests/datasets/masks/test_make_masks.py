@@ -1,5 +1,6 @@
 """Masks of another source for a whole dataset: of this package, and of anybody else."""
 
+import importlib.util
 import json
 
 import numpy as np
@@ -13,9 +14,11 @@ from lerobot_excav.datasets.masks import make_masks as make_masks_module
 from lerobot_excav.datasets.masks import simulated_starts
 from lerobot_excav.datasets.masks.make_masks import make_masks
 from lerobot_excav.datasets.masks.mask_column import PROVENANCE_PATH
+from lerobot_excav.envs.masks.click.segmenter import ClickSegmenter
 from lerobot_excav.errors import ConfigurationError, DatasetError
 from lerobot_excav.scripts.main import main
 
+from ...envs.masks import tiny_models
 from ..toy import load
 
 STORAGES = ("image", "video")
@@ -149,6 +152,52 @@ def test_somebody_elses_dataset_gets_masks_and_keeps_its_videos(foreign, tmp_pat
     for path in foreign.rglob("*.mp4"):
         assert (out / path.relative_to(foreign)).read_bytes() == path.read_bytes()
     assert dataset.meta.stats[MASK_KEY]["mean"].ravel() == pytest.approx([0.25] * 3)
+
+
+TOP = "--main_camera=observation.images.top"
+
+
+def test_a_click_in_somebody_elses_picture_becomes_a_mask(foreign, tmp_path, monkeypatch):
+    """The network would mark nothing in noise, so a planted one marks what is left above the click."""
+    places = []
+
+    def above(self, picture, row, column):
+        places.append((picture.shape, row, column))
+        rows, columns = np.indices(picture.shape[:2])
+        return (rows < row * picture.shape[0]) & (columns < column * picture.shape[1])
+
+    monkeypatch.setattr(ClickSegmenter, "pixels", above)
+    (tmp_path / "clicks.toml").write_text('[[click]]\nkey = "*"\nplace = [0.25, 0.5]\n')
+    out = tmp_path / "clicked"
+    options = f"--mask.options={tmp_path / 'clicks.toml'}"
+    assert main(["masks", str(foreign), "--source=click", options, TOP, f"--out={out}"]) == 0
+    assert places == [((48, 64, 3), 0.5, 0.25)] * 2  # once for an episode
+    expected = np.zeros((48, 64), bool)
+    expected[:24, :16] = True
+    dataset = LeRobotDataset("someone/so101", root=out, video_backend="pyav")
+    assert np.array_equal(dataset[5][MASK_KEY].numpy()[0] > 0.5, expected)
+    assert json.loads((out / PROVENANCE_PATH).read_text())["source"] == "click"
+
+
+@pytest.mark.skipif(importlib.util.find_spec("transformers") is None, reason="the extra masks")
+def test_words_become_masks_of_somebody_elses_dataset_by_the_real_classes(foreign, tmp_path):
+    """With the command of the pages and weights of another path; theirs are random and tiny."""
+    tiny_models.save_grounding_dino(tmp_path / "dino")
+    tiny_models.save_sam2(tmp_path / "sam2")
+    (tmp_path / "sam.toml").write_text(
+        f'threshold = 0.0\ntext_threshold = 0.0\n[detector]\nname = "{tmp_path / "dino"}"\n'
+        f'[segmenter]\nname = "{tmp_path / "sam2"}"\n'
+    )
+    flags = ["--source=grounded_sam", "--mask.text=the red block", f"--mask.options={tmp_path / 'sam.toml'}"]
+    assert main(["masks", str(foreign), *flags, TOP, f"--out={tmp_path / 'out'}"]) == 0
+    dataset = LeRobotDataset("someone/so101", root=tmp_path / "out", video_backend="pyav")
+    assert set(np.unique(dataset[5][MASK_KEY].numpy())) == {0.0, 1.0}
+    noted = json.loads((tmp_path / "out" / PROVENANCE_PATH).read_text())
+    assert noted["text"] == "the red block"
+    facts = [episode["masks"][0] for episode in noted["episodes"]]
+    assert [(each["words"], each["detector"], each["segmenter"]) for each in facts] == [
+        ("the red block", "dino", "sam2")
+    ] * 2
 
 
 @pytest.mark.parametrize(

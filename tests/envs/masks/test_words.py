@@ -94,6 +94,30 @@ def test_logits_of_a_square_become_pixels_of_a_picture_that_is_none(weights):
     assert box == pytest.approx([32.0, 32.0, 64.0, 64.0])
 
 
+def test_the_real_sam2_marks_pixels_of_the_picture_that_it_is_given(weights):
+    for picture in (PICTURE, np.repeat(np.repeat(PICTURE, 4, axis=0), 4, axis=1)):
+        height, width = picture.shape[:2]
+        box = (0.25 * width, 0.25 * height, 0.5 * width, 0.5 * height)
+        marked = [SegmentAnything(ModelName(name=str(weights / "sam2")), HERE).pixels(picture, box) for _ in range(2)]
+        assert marked[0].shape == (height, width)
+        assert marked[0].dtype == bool
+        assert np.array_equal(*marked)
+
+
+def test_the_whole_chain_of_real_classes_shows_a_mask_on_the_arm(options):
+    """Nothing is replaced here: random weights find some box, and mark something in it."""
+    env = FR5GraspEnv(render_mode=None, scene_set="val", **options())
+    env.reset(options=START)
+    assert env.mask.source == "grounded_sam"
+    assert env.mask.pixels.shape == (96, 128)
+    assert env.mask.pixels.any()
+    assert (env.mask.parameters["detector"], env.mask.parameters["segmenter"]) == ("dino", "sam2")
+    left, upper, right, lower = env.mask.parameters["box"]
+    assert 0.0 <= left < right <= 512.0
+    assert 0.0 <= upper < lower <= 384.0
+    env.close()
+
+
 @pytest.mark.parametrize(
     "make", [pytest.param(lambda **s: ExcavatorEnv(fidelity="fast", **s), marks=pytest.mark.slow), FR5GraspEnv]
 )

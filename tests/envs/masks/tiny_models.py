@@ -78,17 +78,10 @@ CHAT = (
 )
 
 
-def save_qwen(folder):
-    """Save a Qwen2.5-VL whose letters are bytes."""
+def byte_language():
+    """Return a tokenizer whose letters are bytes, and what the configuration of a model says of its language."""
     from tokenizers.pre_tokenizers import ByteLevel
-    from transformers import (
-        Qwen2_5_VLConfig,
-        Qwen2_5_VLForConditionalGeneration,
-        Qwen2_5_VLProcessor,
-        Qwen2Tokenizer,
-        Qwen2VLImageProcessor,
-        Qwen2VLVideoProcessor,
-    )
+    from transformers import Qwen2Tokenizer
 
     special = ["<|im_start|>", "<|im_end|>", "<|vision_start|>", "<|vision_end|>", "<|image_pad|>", "<|video_pad|>"]
     vocabulary = {token: number for number, token in enumerate([*sorted(ByteLevel.alphabet()), "<|endoftext|>"])}
@@ -97,23 +90,61 @@ def save_qwen(folder):
     number = tokenizer.convert_tokens_to_ids
     text = {
         "vocab_size": len(tokenizer), "hidden_size": 32, "intermediate_size": 32, "num_hidden_layers": 1,
-        "num_attention_heads": 2, "num_key_value_heads": 1, "max_position_embeddings": 4096,
+        "num_attention_heads": 2, "num_key_value_heads": 1, "head_dim": 16, "max_position_embeddings": 4096,
         "rope_parameters": {"rope_type": "default", "mrope_section": [2, 3, 3], "rope_theta": 10_000.0},
         "bos_token_id": number("<|im_start|>"), "eos_token_id": number("<|im_end|>"),
         "pad_token_id": number("<|endoftext|>"),
     }  # fmt: skip
+    names = {"image": "image_pad", "video": "video_pad", "vision_start": "vision_start", "vision_end": "vision_end"}
+    return tokenizer, {
+        "text_config": text,
+        **{f"{name}_token_id": number(f"<|{token}|>") for name, token in names.items()},
+    }
+
+
+def save_qwen(folder):
+    """Save a Qwen2.5-VL whose letters are bytes."""
+    from transformers import (
+        Qwen2_5_VLConfig,
+        Qwen2_5_VLForConditionalGeneration,
+        Qwen2_5_VLProcessor,
+        Qwen2VLImageProcessor,
+        Qwen2VLVideoProcessor,
+    )
+
+    tokenizer, language = byte_language()
     vision = {
         "depth": 1, "hidden_size": 32, "intermediate_size": 32, "num_heads": 2, "out_hidden_size": 32,
         "fullatt_block_indexes": [0],
     }  # fmt: skip
-    config = Qwen2_5_VLConfig(
-        text_config=text, vision_config=vision, image_token_id=number("<|image_pad|>"),
-        video_token_id=number("<|video_pad|>"), vision_start_token_id=number("<|vision_start|>"),
-        vision_end_token_id=number("<|vision_end|>"),
-    )  # fmt: skip
+    config = Qwen2_5_VLConfig(vision_config=vision, **language)
     torch.manual_seed(0)
     Qwen2_5_VLForConditionalGeneration(config).save_pretrained(folder)
     pixels = {"min_pixels": 28 * 28, "max_pixels": 28 * 28 * 40}
     Qwen2_5_VLProcessor(
         Qwen2VLImageProcessor(**pixels), tokenizer, Qwen2VLVideoProcessor(), chat_template=CHAT
+    ).save_pretrained(folder)
+
+
+def save_qwen3(folder):
+    """Save a Qwen3-VL whose letters are bytes."""
+    from transformers import (
+        Qwen2VLImageProcessor,
+        Qwen3VLConfig,
+        Qwen3VLForConditionalGeneration,
+        Qwen3VLProcessor,
+        Qwen3VLVideoProcessor,
+    )
+
+    tokenizer, language = byte_language()
+    vision = {
+        "depth": 1, "hidden_size": 32, "intermediate_size": 32, "num_heads": 2, "out_hidden_size": 32,
+        "deepstack_visual_indexes": [0], "num_position_embeddings": 64,
+    }  # fmt: skip
+    config = Qwen3VLConfig(vision_config=vision, **language)
+    torch.manual_seed(0)
+    Qwen3VLForConditionalGeneration(config).save_pretrained(folder)
+    pixels = {"size": {"shortest_edge": 32 * 32, "longest_edge": 32 * 32 * 40}, "patch_size": 16}
+    Qwen3VLProcessor(
+        Qwen2VLImageProcessor(**pixels), tokenizer, Qwen3VLVideoProcessor(), chat_template=CHAT
     ).save_pretrained(folder)

@@ -4,6 +4,7 @@ import importlib.util
 import json
 import logging
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,13 @@ from lerobot_excav.envs.masks.vision_language import Answer, VisionLanguageModel
 from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.planner.depth_picture import depth_picture
-from lerobot_excav.envs.tasks.planner.dig_answer import UnusableAnswerError, read_answer
+from lerobot_excav.envs.tasks.planner.dig_answer import (
+    UnusableAnswerError,
+    read_answer,
+    require_diggable,
+    require_reach,
+)
+from lerobot_excav.envs.tasks.planner.vlm_dig import REACH_M
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.excavator_sim.config_excavator_sim import ExcavatorSimConfig
@@ -186,7 +193,73 @@ def test_depth_is_light_where_it_is_near():
     assert depth_picture(np.ones((4, 4), np.float32)).max() == 0
 
 
-@pytest.mark.skipif(importlib.util.find_spec("transformers") is None, reason="the extra masks")
+@pytest.mark.parametrize(("radius_m", "fits"), [(2.59, False), (2.61, True), (6.39, True), (6.41, False)])
+def test_a_place_lies_where_the_bucket_reaches(radius_m, fits):
+    if fits:
+        require_reach(radius_m, REACH_M)
+        return
+    with pytest.raises(UnusableAnswerError, match=rf"its place is {radius_m:.1f} m away.*from 2\.6 to 6\.4 m"):
+        require_reach(radius_m, REACH_M)
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [({"is_barred": True}, "barred by keep_out"), ({"is_possible": False}, r"not worth a cycle: 0\.02 m3"), ({}, None)],
+)
+def test_a_place_is_dug_only_if_the_planner_would(changes, why):
+    facts = {"is_barred": False, "is_possible": True, "swept_m3": 0.02, "onset_m": 0.5, "seen_share": 1.0, **changes}
+    rated = SimpleNamespace(**{name: np.array([value]) for name, value in facts.items()})
+    if why is None:
+        require_diggable(rated)
+        return
+    with pytest.raises(UnusableAnswerError, match=why):
+        require_diggable(rated)
+
+
+needs_transformers = pytest.mark.skipif(importlib.util.find_spec("transformers") is None, reason="the extra masks")
+
+
+@needs_transformers
+def test_the_real_classes_look_at_a_pile_and_an_answer_of_noise_is_left_to_the_planner(tmp_path, caplog):
+    """Nothing is replaced here: random weights say something, and it is no JSON."""
+    tiny_models.save_qwen(tmp_path / "qwen")
+    (tmp_path / "vlm.toml").write_text(f'most_tokens = 16\n[model]\nname = "{tmp_path / "qwen"}"\n')
+    env = ExcavatorEnv(**VLM, episode_length=1, mask_options=str(tmp_path / "vlm.toml"))
+    with caplog.at_level(logging.WARNING):
+        env.reset(options=START)
+    assert "qwen: it answers without JSON" in caplog.text
+    assert env.mask.pixels.any()
+    *_, info = env.step(env.holding_action())
+    assert info["episode_metrics"]["mask_fallbacks"] == 1
+    env.close()
+
+
+@needs_transformers
+def test_the_real_sam2_bounds_the_region_that_a_model_has_chosen(tmp_path, liked, monkeypatch):
+    _, (column, row) = liked
+    monkeypatch.setattr(VisionLanguageModel, "ask", lambda *_: Answer(box_around(column, row), SIZE))
+    tiny_models.save_sam2(tmp_path / "sam2")
+    (tmp_path / "vlm.toml").write_text(f'[segmenter]\nname = "{tmp_path / "sam2"}"\n')
+    env = ExcavatorEnv(**VLM, mask_options=str(tmp_path / "vlm.toml"))
+    env.reset(options=START)
+    facts = env.mask.parameters
+    assert facts["reason"] == "much sand"
+    assert 0 <= facts["inside_px"] <= min(facts["patch_px"], facts["whole_px"])
+    assert env.mask.pixels.any()
+    env.close()
+
+
+@needs_transformers
+def test_places_of_a_qwen3_are_thousandths_of_the_picture(tmp_path):
+    tiny_models.save_qwen3(tmp_path / "qwen3")
+    model = VisionLanguageModel(
+        ModelName(name=str(tmp_path / "qwen3")), Placement(download=False, device="cpu"), most_tokens=4
+    )
+    picture = np.zeros((96, 128, 3), np.uint8)
+    assert model.ask([picture, picture], "Where to dig?").scale == (1000.0, 1000.0)
+
+
+@needs_transformers
 def test_the_real_classes_answer_about_two_pictures(tmp_path):
     tiny_models.save_qwen(tmp_path / "qwen")
     model = VisionLanguageModel(
