@@ -12,16 +12,9 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from lerobot_excav.datasets.alignment.noted_frames import NotedFrame, NotedFrames, read_noted_frames
 from lerobot_excav.datasets.complete.exchange import copy_foreign_files, require_free, workspace
+from lerobot_excav.datasets.format.alignment_columns import ALIGNMENT_COLUMNS
 from lerobot_excav.datasets.format.dataset_info import INFO_PATH
 from lerobot_excav.errors import DatasetError
-
-COLUMNS = {
-    "excav.image_age_ms": "float32",
-    "excav.state_age_ms": "float32",
-    "excav.is_causal": "bool",
-    "excav.is_as_told": "bool",
-}
-"""Columns and their types, in the order of `NotedFrame`."""
 
 
 class AlignmentCounts(NamedTuple):
@@ -36,7 +29,7 @@ class AlignmentCounts(NamedTuple):
 
 
 def write_aligned_copy(root: Path, out: Path, *, log: Path) -> AlignmentCounts:
-    """Write a copy of a dataset with the columns `COLUMNS`, from the alignment log of its recording.
+    """Write a copy of a dataset with the columns `ALIGNMENT_COLUMNS`, from the alignment log of its recording.
 
     Frames, videos, tasks and statistics of the dataset stay as they are, and so do files that LeRobot does not know.
 
@@ -51,14 +44,14 @@ def write_aligned_copy(root: Path, out: Path, *, log: Path) -> AlignmentCounts:
     """
     require_free(out)
     info = _read_info(root)
-    if known := sorted(COLUMNS.keys() & info["features"].keys()):
+    if known := sorted(ALIGNMENT_COLUMNS.keys() & info["features"].keys()):
         raise DatasetError(f"{root} has {', '.join(known)} already")
     noted = read_noted_frames(log)
     dataset = LeRobotDataset(f"local/{root.name}", root=root)
     rows = _rows_of(dataset, noted, root, log)
     columns = {
         name: (np.array([row[place] for _, row in rows], dtype), {"dtype": dtype, "shape": (1,), "names": None})
-        for place, (name, dtype) in enumerate(COLUMNS.items())
+        for place, (name, dtype) in enumerate(ALIGNMENT_COLUMNS.items())
     }
     with workspace(beside=out) as folder:
         add_features(dataset, columns, output_dir=folder / "dataset", repo_id=f"local/{out.name}")

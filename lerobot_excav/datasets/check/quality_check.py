@@ -21,6 +21,7 @@ from lerobot_excav.datasets.check.quality_report import Findings, QualityReport
 from lerobot_excav.datasets.check.readability import layout_problems, opening_problem
 from lerobot_excav.datasets.check.replay_check import replay_problem
 from lerobot_excav.datasets.check.statistics_check import VECTOR_KEYS, SeenValues, statistics_problems
+from lerobot_excav.datasets.check.testbed_check import check_testbed_recording, is_testbed_recording
 from lerobot_excav.datasets.format.dataset_info import DatasetInfo, read_info
 from lerobot_excav.datasets.format.episode_table import EpisodeTable, episode_table, iterate_episodes
 from lerobot_excav.datasets.format.frame_files import EpisodeRows, iterate_rows
@@ -61,6 +62,8 @@ def check_dataset(
 ) -> QualityReport:
     """Check a dataset. Damage is a problem of the report, not an error.
 
+    A recording of a real machine has no scene, so it is neither replayed nor compared with its pairs; its ages are.
+
     Args:
         root: The dataset.
         episodes: Episodes to check; all by default.
@@ -81,6 +84,8 @@ def check_dataset(
     if info is None:
         return findings.report()
     _require_known(episodes, info)
+    if is_testbed_recording(info):
+        return check_testbed_recording(root, info, episodes)
     dataset = _Dataset(
         root=root,
         info=info,

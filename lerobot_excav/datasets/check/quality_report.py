@@ -18,10 +18,12 @@ class QualityReport:
         problems: What concerns all of it, each naming a file and what is wrong with it.
         episodes: A row per checked episode: `episode_index`, `pair_uid` (empty if unknown), `qc` (`passed` or
             `failed`), `qc_problem`, `replayed`.
+        has_pairs: Whether the episodes are of scenes, which an index of pairs can name; a real machine has none.
     """
 
     problems: list[str]
     episodes: pd.DataFrame
+    has_pairs: bool = True
 
     @property
     def has_passed(self) -> bool:
@@ -65,7 +67,7 @@ class Findings:
         """Return the episodes in which nothing was found."""
         return sorted(index for index, problems in self.episodes.items() if not problems)
 
-    def report(self) -> QualityReport:
+    def report(self, *, has_pairs: bool = True) -> QualityReport:
         """Return the verdicts."""
         rows = [
             {
@@ -78,4 +80,4 @@ class Findings:
             for index, problems in sorted(self.episodes.items())
         ]
         columns = ["episode_index", "pair_uid", "qc", "qc_problem", "replayed"]
-        return QualityReport(problems=self.dataset, episodes=pd.DataFrame(rows, columns=columns))
+        return QualityReport(problems=self.dataset, episodes=pd.DataFrame(rows, columns=columns), has_pairs=has_pairs)

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from lerobot_excav.datasets.alignment.aligned_copy import COLUMNS, write_aligned_copy
+from lerobot_excav.datasets.alignment.aligned_copy import write_aligned_copy
+from lerobot_excav.datasets.format.alignment_columns import ALIGNMENT_COLUMNS
 from lerobot_excav.errors import DatasetError
 from lerobot_excav.robots.excavator_testbed.alignment import Ages, AlignmentLog
 from lerobot_excav.scripts.main import main
@@ -64,7 +65,7 @@ def test_every_frame_says_how_old_what_it_saw_was(recording, tmp_path):
 def test_all_else_stays_as_it_is(recording, tmp_path):
     write_aligned_copy(recording, tmp_path / "out", log=write_log(tmp_path / "log.jsonl", lengths_of(recording)))
     for ours, theirs in zip(load(tmp_path / "out"), load(recording), strict=True):
-        assert set(ours) == set(theirs) | set(COLUMNS)
+        assert set(ours) == set(theirs) | set(ALIGNMENT_COLUMNS)
         assert all(np.array_equal(ours[name], value) for name, value in theirs.items())
 
 
