@@ -22,6 +22,7 @@ from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetW
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
 from lerobot_excav.policies.mask_act.training_masks import TrainingMasks, require_statistics
 from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
+from lerobot_excav.policies.mask_act.way_back import WayBack
 
 
 class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are untyped here
@@ -64,6 +65,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self._command_changes = CommandChanges(meta)
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
+        self._way_back = WayBack()
         # LeRobot's `drop_queued_actions` clears what has this name.
         self._action_queue = (
             ActionQueue(resolved(config.n_action_steps))
@@ -104,6 +106,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     def reset(self) -> None:
         """Forget plans and targets; call it whenever the environments are reset."""
         self._watch.reset()
+        self._way_back.clear()
         self._action_queue.clear()
 
     def forward(self, batch: Batch, reduction: str = "mean") -> tuple[Tensor, dict[str, float]]:
@@ -156,7 +159,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         """Return the next action of each environment, float32, shape (B, A), normalised.
 
         An environment gets a new plan when its plan has run out or its mask has changed. The other environments keep
-        their plans.
+        their plans. With `backtrack`, one whose mask shows another target goes back the way it has come before that.
 
         Args:
             batch: Observations of all environments.
@@ -167,13 +170,27 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
                 environments changed without `reset`.
         """
         self.eval()
-        changed = self._watch.changed(target_mask(self.config, batch))
+        mask = target_mask(self.config, batch)
+        changed = self._watch.changed(mask)
         if isinstance(self._action_queue, TemporalEnsembles):
             return self._action_queue.update(self.predict_action_chunk(batch), changed)
+        if self.config.backtrack:
+            changed = self._led_back(self._action_queue, mask, changed)
         stale = self._action_queue.stale(changed)
         if stale.any():
             self._action_queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
-        return self._action_queue.pop()
+        actions = self._action_queue.pop()
+        if self.config.backtrack:
+            self._way_back.note(actions)
+        return actions
+
+    def _led_back(self, queue: ActionQueue, mask: Tensor, changed: Tensor) -> Tensor:
+        """Lead environments back whose mask shows another target; return which of the others need a new plan."""
+        if queue.knows_nobody:  # somebody else may have moved the machine since the last plan
+            self._way_back.clear()
+        for number, actions in self._way_back.begin(mask).items():
+            queue.lead(number, actions)
+        return changed & ~self._way_back.is_leading.to(changed.device)
 
     def _augmented(self, batch: Batch, mask: Tensor) -> tuple[Batch, Tensor]:
         """Return batch and mask for one training step, by the `augment_...` settings."""

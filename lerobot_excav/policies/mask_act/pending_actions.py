@@ -1,6 +1,7 @@
 """What each environment of a batch has left of its plan."""
 
 from collections import deque
+from collections.abc import Sequence
 from functools import partial
 
 import torch
@@ -48,6 +49,11 @@ class ActionQueue:
         """Drop every plan."""
         self._plans: list[deque[Tensor]] = []
 
+    @property
+    def knows_nobody(self) -> bool:
+        """Whether no environment has had a plan since all were dropped."""
+        return not self._plans
+
     def __len__(self) -> int:
         """Return the number of actions that every environment has left."""
         return min(map(len, self._plans), default=0)
@@ -63,6 +69,10 @@ class ActionQueue:
         self._plans = self._plans or [deque() for _ in stale]
         for number, plan in zip(stale.nonzero().flatten().tolist(), chunk, strict=True):
             self._plans[number] = deque(plan[: self._n_action_steps])
+
+    def lead(self, number: int, actions: Sequence[Tensor]) -> None:
+        """Replace the plan of an environment by actions, each (A,), all of which are played."""
+        self._plans[number] = deque(actions)
 
     def pop(self) -> Tensor:
         """Return the next action of every environment, shape (B, A)."""

@@ -1,0 +1,108 @@
+"""A policy that goes back the way it came when another target is shown, environment by environment."""
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.policies.mask_act.way_back import WayBack
+
+from .conftest import MASK
+
+
+def shown(batch, mask, *places, size=12):
+    """A batch whose environments show squares at these places."""
+    observation = batch(batch_size=len(places))
+    for number, (top, left) in enumerate(places):
+        observation[MASK][number] = mask(1, top=top, left=left, size=size)[0]
+    return observation
+
+
+FIRST, OTHER, THIRD = (8, 16), (18, 34), (0, 0)
+
+
+def play(agent, observation, steps):
+    return torch.stack([agent.select_action(observation) for _ in range(steps)], dim=1)
+
+
+def test_another_target_is_answered_by_the_way_back_and_then_by_a_plan_from_there(awake, batch, mask):
+    agent = awake(backtrack=True, n_action_steps=4)
+    there = play(agent, shown(batch, mask, FIRST, FIRST), 6)
+    turned = shown(batch, mask, FIRST, OTHER)
+    back = play(agent, turned, 6)
+    torch.testing.assert_close(back[1], there[1].flip(0), rtol=0, atol=0)
+    plan = agent.predict_action_chunk(turned)
+    after = play(agent, turned, 4)
+    torch.testing.assert_close(after[1], plan[1, :4], rtol=1e-5, atol=1e-5)
+
+
+def test_whoever_keeps_its_target_is_not_touched_by_others(awake, batch, mask):
+    turning, steady = (awake(backtrack=is_on, n_action_steps=4) for is_on in (True, False))
+    kept = []
+    for agent, second in ((turning, OTHER), (steady, FIRST)):
+        play(agent, shown(batch, mask, FIRST, FIRST), 6)
+        kept.append(play(agent, shown(batch, mask, FIRST, second), 9)[0])
+    torch.testing.assert_close(*kept, rtol=1e-5, atol=1e-5)
+
+
+def test_a_target_that_changes_again_on_the_way_back_is_looked_at_at_its_end(awake, batch, mask):
+    agent = awake(backtrack=True, n_action_steps=4)
+    there = play(agent, shown(batch, mask, FIRST), 5)
+    back = torch.cat([play(agent, shown(batch, mask, OTHER), 2), play(agent, shown(batch, mask, THIRD), 3)], dim=1)
+    torch.testing.assert_close(back[0], there[0].flip(0), rtol=0, atol=0)
+    last = shown(batch, mask, THIRD)
+    plan = agent.predict_action_chunk(last)
+    torch.testing.assert_close(play(agent, last, 4)[0], plan[0, :4], rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("moved", [(8, 20), (14, 16)])
+def test_a_mask_that_only_moves_is_the_same_target(awake, batch, mask, moved):
+    agents = [awake(backtrack=is_on, n_action_steps=4) for is_on in (True, False)]
+    actions = []
+    for agent in agents:
+        play(agent, shown(batch, mask, FIRST), 3)
+        actions.append(play(agent, shown(batch, mask, moved), 6))
+    torch.testing.assert_close(*actions, rtol=0, atol=0)
+
+
+def test_after_a_reset_and_after_dropped_plans_there_is_no_way_to_go_back(awake, batch, mask):
+    for forget in ("reset", "_action_queue.clear"):
+        agent = awake(backtrack=True, n_action_steps=4)
+        play(agent, shown(batch, mask, FIRST), 5)
+        method = agent
+        for name in forget.split("."):
+            method = getattr(method, name)
+        method()
+        turned = shown(batch, mask, OTHER)
+        plan = agent.predict_action_chunk(turned)
+        torch.testing.assert_close(play(agent, turned, 4)[0], plan[0, :4], rtol=1e-5, atol=1e-5)
+
+
+def test_an_ensemble_has_no_way_back(config):
+    with pytest.raises(ConfigurationError, match="backtrack=True is not possible with temporal_ensemble_coeff"):
+        config(backtrack=True, temporal_ensemble_coeff=0.01)
+
+
+PLACES = st.lists(st.sampled_from([None, 0, 1, 2]), min_size=1, max_size=40)
+
+
+@given(PLACES)
+def test_the_way_back_ends_where_the_way_began_whatever_is_shown(places):
+    """Each action is a step that the opposite one undoes, and a step is named by its number."""
+    way_back, stack, queue = WayBack(), [], []
+    for number, place in enumerate(places):
+        mask = torch.zeros(1, 1, 1, 3)
+        if place is not None:
+            mask[..., place] = 1.0
+        for actions in way_back.begin(mask).values():
+            queue = list(actions)
+            assert [int(action) for action in queue] == stack[::-1]
+        if queue:
+            action = queue.pop(0)
+            assert int(action) == stack.pop()
+        else:
+            assert not way_back.is_leading.any()
+            action = torch.tensor([float(number)])
+            stack.append(number)
+        way_back.note(action[None])
