@@ -1,8 +1,8 @@
 """Train the small network that turns a click into a mask, or measure one.
 
 With --out a network learns from masks of the simulator, within twenty minutes on two cores, and is written to that
-file; `mask_source=click` takes it by `model = "FILE"` in its options. Then, or without --out at once, it clicks on every
-target of other scenes and prints how well the masks fit (intersection over union, at 96 x 128).
+file; `mask_source=click` takes it by `model = "FILE"` in its options. Then, or without --out at once, it clicks on
+every target of other scenes and prints how well the masks fit (intersection over union, at 96 x 128).
 
 Examples:
   lerobot-excav segmenter
