@@ -211,7 +211,7 @@ POLICY = {
     "augment_shift_px": whole(0, 1024),
     "augment_mask_px": whole(0, 1024),
     "compare_masks": flag,
-    "backtrack": flag,
+    "backtrack_frames": whole(0, 10_000),
     "mask_key": feature_name,
     "main_camera": optional(feature_name),
     **dict.fromkeys(("withhold_mask", "target_token", "coordinate_channels", "optimizer_fused"), flag),

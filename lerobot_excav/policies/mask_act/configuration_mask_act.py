@@ -126,10 +126,13 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         high=10.0,
         hint="ACT's is 0.01.",
     )
-    backtrack: bool = setting(
-        "When the mask shows another target, play the actions since the last one backwards, and plan from there: for "
-        "actions that are positions, and a policy that has seen no changes of mind",
-        default=False,
+    backtrack_frames: int = setting(
+        "When the mask shows another target within so many frames of the last one, play the actions of these frames "
+        "backwards, and plan from there: for actions that are positions, and a policy that has seen no changes of "
+        "mind; 0 never goes back [frames]",
+        default=0,
+        low=0,
+        high=10_000,
     )
     n_obs_steps: int = setting("Frames that the policy sees at a time", default=1, choices=(1,))
 
@@ -260,10 +263,11 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"policy.n_action_steps={steps} must be 1 with temporal_ensemble_coeff={coefficient}: an "
             "ensemble needs a plan at every step. Leave n_action_steps unset or set it to 1.",
         )
+        frames = self.backtrack_frames
         require(
-            not (self.backtrack and coefficient is not None),
-            f"policy.backtrack=True is not possible with temporal_ensemble_coeff={coefficient}: the way back is no "
-            "average of plans. Leave one of them out.",
+            not (frames and coefficient is not None),
+            f"policy.backtrack_frames={frames} is not possible with temporal_ensemble_coeff={coefficient}: the way "
+            "back is no average of plans. Leave one of them out.",
         )
         require(
             coefficient is None or -coefficient * (chunk - 1) <= _GREATEST_EXPONENT,

@@ -65,7 +65,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self._command_changes = CommandChanges(meta)
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
-        self._way_back = WayBack()
+        self._way_back = WayBack(config.backtrack_frames)
         # LeRobot's `drop_queued_actions` clears what has this name.
         self._action_queue = (
             ActionQueue(resolved(config.n_action_steps))
@@ -159,7 +159,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         """Return the next action of each environment, float32, shape (B, A), normalised.
 
         An environment gets a new plan when its plan has run out or its mask has changed. The other environments keep
-        their plans. With `backtrack`, one whose mask shows another target goes back the way it has come before that.
+        their plans. With `backtrack_frames`, one whose mask shows another target goes back the way it
+        has come before that.
 
         Args:
             batch: Observations of all environments.
@@ -174,13 +175,13 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         changed = self._watch.changed(mask)
         if isinstance(self._action_queue, TemporalEnsembles):
             return self._action_queue.update(self.predict_action_chunk(batch), changed)
-        if self.config.backtrack:
+        if self.config.backtrack_frames:
             changed = self._led_back(self._action_queue, mask, changed)
         stale = self._action_queue.stale(changed)
         if stale.any():
             self._action_queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
         actions = self._action_queue.pop()
-        if self.config.backtrack:
+        if self.config.backtrack_frames:
             self._way_back.note(actions)
         return actions
 

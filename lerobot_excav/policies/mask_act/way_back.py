@@ -5,14 +5,19 @@ from torch import Tensor
 
 
 class WayBack:
-    """Leads an environment back along its own actions when its mask shows another target.
+    """Leads an environment back along its own actions when its mask shows another target soon after the last one.
 
     A policy that has seen no change of mind knows the states on the way to one target, not those from there to another
-    one. At the end of the way back it is where it began, and there it knows what to do. A mask of which a part lies on
-    the one before shows the same target, moved or seen better, and an empty one shows none.
+    one. At the end of the way back it is where it began, and there it knows what to do. That holds for actions that are
+    positions; rates in the opposite order lead elsewhere. A mask of which a part lies on the one before shows the same
+    target, moved or seen better, and an empty one shows none.
+
+    Args:
+        most_frames: Longest way that is gone back; after a longer one the other target is no change of mind.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_frames: int) -> None:
+        self._most_frames = most_frames
         self.clear()
 
     def clear(self) -> None:
@@ -41,9 +46,11 @@ class WayBack:
             if self._left[number] or not shown[number]:
                 continue
             self._mask[number] = mask[number]
-            if way and is_other[number]:
-                led[number] = way[::-1]
-                self._ways[number], self._left[number] = [], len(way)
+            if is_other[number]:
+                self._ways[number] = []
+                if 0 < len(way) <= self._most_frames:
+                    led[number] = way[::-1]
+                    self._left[number] = len(way)
         return led
 
     def note(self, actions: Tensor) -> None:
@@ -51,5 +58,5 @@ class WayBack:
         for number, action in enumerate(actions):
             if self._left[number]:
                 self._left[number] -= 1
-            else:
+            elif len(self._ways[number]) <= self._most_frames:  # one more than is gone back says that it is too long
                 self._ways[number].append(action.clone())

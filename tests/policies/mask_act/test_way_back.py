@@ -27,7 +27,7 @@ def play(agent, observation, steps):
 
 
 def test_another_target_is_answered_by_the_way_back_and_then_by_a_plan_from_there(awake, batch, mask):
-    agent = awake(backtrack=True, n_action_steps=4)
+    agent = awake(backtrack_frames=20, n_action_steps=4)
     there = play(agent, shown(batch, mask, FIRST, FIRST), 6)
     turned = shown(batch, mask, FIRST, OTHER)
     back = play(agent, turned, 6)
@@ -38,7 +38,7 @@ def test_another_target_is_answered_by_the_way_back_and_then_by_a_plan_from_ther
 
 
 def test_whoever_keeps_its_target_is_not_touched_by_others(awake, batch, mask):
-    turning, steady = (awake(backtrack=is_on, n_action_steps=4) for is_on in (True, False))
+    turning, steady = (awake(backtrack_frames=20 * is_on, n_action_steps=4) for is_on in (True, False))
     kept = []
     for agent, second in ((turning, OTHER), (steady, FIRST)):
         play(agent, shown(batch, mask, FIRST, FIRST), 6)
@@ -47,7 +47,7 @@ def test_whoever_keeps_its_target_is_not_touched_by_others(awake, batch, mask):
 
 
 def test_a_target_that_changes_again_on_the_way_back_is_looked_at_at_its_end(awake, batch, mask):
-    agent = awake(backtrack=True, n_action_steps=4)
+    agent = awake(backtrack_frames=20, n_action_steps=4)
     there = play(agent, shown(batch, mask, FIRST), 5)
     back = torch.cat([play(agent, shown(batch, mask, OTHER), 2), play(agent, shown(batch, mask, THIRD), 3)], dim=1)
     torch.testing.assert_close(back[0], there[0].flip(0), rtol=0, atol=0)
@@ -58,7 +58,7 @@ def test_a_target_that_changes_again_on_the_way_back_is_looked_at_at_its_end(awa
 
 @pytest.mark.parametrize("moved", [(8, 20), (14, 16)])
 def test_a_mask_that_only_moves_is_the_same_target(awake, batch, mask, moved):
-    agents = [awake(backtrack=is_on, n_action_steps=4) for is_on in (True, False)]
+    agents = [awake(backtrack_frames=20 * is_on, n_action_steps=4) for is_on in (True, False)]
     actions = []
     for agent in agents:
         play(agent, shown(batch, mask, FIRST), 3)
@@ -68,7 +68,7 @@ def test_a_mask_that_only_moves_is_the_same_target(awake, batch, mask, moved):
 
 def test_after_a_reset_and_after_dropped_plans_there_is_no_way_to_go_back(awake, batch, mask):
     for forget in ("reset", "_action_queue.clear"):
-        agent = awake(backtrack=True, n_action_steps=4)
+        agent = awake(backtrack_frames=20, n_action_steps=4)
         play(agent, shown(batch, mask, FIRST), 5)
         method = agent
         for name in forget.split("."):
@@ -80,8 +80,18 @@ def test_after_a_reset_and_after_dropped_plans_there_is_no_way_to_go_back(awake,
 
 
 def test_an_ensemble_has_no_way_back(config):
-    with pytest.raises(ConfigurationError, match="backtrack=True is not possible with temporal_ensemble_coeff"):
-        config(backtrack=True, temporal_ensemble_coeff=0.01)
+    with pytest.raises(ConfigurationError, match="backtrack_frames=9 is not possible with temporal_ensemble_coeff"):
+        config(backtrack_frames=9, temporal_ensemble_coeff=0.01)
+
+
+@pytest.mark.parametrize(("steps", "goes_back"), [(5, True), (6, False)])
+def test_after_a_longer_way_another_target_is_no_change_of_mind(awake, batch, mask, steps, goes_back):
+    agent = awake(backtrack_frames=5, n_action_steps=1)
+    there = play(agent, shown(batch, mask, FIRST), steps)
+    turned = shown(batch, mask, OTHER)
+    plan = agent.predict_action_chunk(turned)
+    expected = there[0].flip(0)[0] if goes_back else plan[0, 0]
+    torch.testing.assert_close(play(agent, turned, 1)[0, 0], expected, rtol=1e-5, atol=1e-5)
 
 
 PLACES = st.lists(st.sampled_from([None, 0, 1, 2]), min_size=1, max_size=40)
@@ -90,7 +100,7 @@ PLACES = st.lists(st.sampled_from([None, 0, 1, 2]), min_size=1, max_size=40)
 @given(PLACES)
 def test_the_way_back_ends_where_the_way_began_whatever_is_shown(places):
     """Each action is a step that the opposite one undoes, and a step is named by its number."""
-    way_back, stack, queue = WayBack(), [], []
+    way_back, stack, queue = WayBack(100), [], []
     for number, place in enumerate(places):
         mask = torch.zeros(1, 1, 1, 3)
         if place is not None:
