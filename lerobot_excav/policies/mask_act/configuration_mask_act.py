@@ -11,12 +11,14 @@ from lerobot.optim.schedulers import ConstantWithWarmupSchedulerConfig, CosineAn
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from lerobot_excav.errors import ConfigurationError, require, require_choice
+from lerobot_excav.policies.mask_act.backbone_weights import known_weights
 from lerobot_excav.policies.mask_act.features import (
     NORMALISED,
     check_features,
     check_normalization,
     require_mask_shape,
     require_moved_mask,
+    require_rgb,
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
@@ -289,9 +291,9 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"to false, or use {', '.join(BACKBONES[len(_UNDILATED) :])}.",
         )
         require(
-            weights is None or weights in _known_weights(backbone),
+            weights is None or weights in known_weights(backbone),
             f"policy.pretrained_backbone_weights={weights!r} do not exist for vision_backbone={backbone!r}; allowed: "
-            f"{', '.join(_known_weights(backbone)) or 'none; set them to null or use resnet18'}.",
+            f"{', '.join(known_weights(backbone)) or 'none; set them to null or use resnet18'}.",
         )
 
     @property
@@ -344,12 +346,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         )
         require_choice("main_camera", self.main_camera_key, cameras, hint="Set --policy.main_camera.")
         for key in cameras:
-            shape = tuple(self.image_features[key].shape)
-            require(
-                shape[0] == 3,
-                f"{key} has {shape[0]} channel(s), shape {shape}; mask_act reads RGB cameras. Leave it out of "
-                "--policy.input_features.",
-            )
+            require_rgb(key, tuple(self.image_features[key].shape))
         main_shape = tuple(self.image_features[self.main_camera_key].shape)
         for name in ("augment_shift_px", "augment_mask_px"):
             value = getattr(self, name)
@@ -402,13 +399,3 @@ MISSING_MASK_HINT = (
 
 
 _ACTS_OWN = frozenset(field.name for field in fields(ACTConfig))
-
-
-def _known_weights(backbone: str) -> list[str]:
-    """Return the names of torchvision's weights for a backbone, as its functions take them."""
-    if backbone == "resnet_small":
-        return []
-    from torchvision.models import get_model_weights  # slow to import, and asked for by few
-
-    kind = get_model_weights(backbone)
-    return [f"{prefix}{name}" for prefix in (f"{kind.__name__}.", "") for name in kind.__members__]

@@ -71,6 +71,19 @@ def check_normalization(field: str, mapping: Mapping[str, NormalizationMode]) ->
     )
 
 
+def require_rgb(key: str, shape: tuple[int, ...]) -> None:
+    """Check that a camera has three channels.
+
+    Raises:
+        ConfigurationError: It has others.
+    """
+    require(
+        shape[0] == 3,
+        f"{key} has {shape[0]} channel(s), shape {shape}; mask_act reads RGB cameras. Leave it out of "
+        "--policy.input_features.",
+    )
+
+
 def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str, main_shape: tuple[int, ...]) -> None:
     """Raise `ConfigurationError` unless the shape of a mask fits its camera: ([B,] 1 or 3, H, W) to ([B,] 3, H, W)."""
     *batch, _, height, width = main_shape
