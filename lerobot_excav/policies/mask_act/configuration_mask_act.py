@@ -265,11 +265,10 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"policy.n_action_steps={steps} must be 1 with temporal_ensemble_coeff={coefficient}: an "
             "ensemble needs a plan at every step. Leave n_action_steps unset or set it to 1.",
         )
-        frames = self.backtrack_frames
         require(
-            not (frames and coefficient is not None),
-            f"policy.backtrack_frames={frames} is not possible with temporal_ensemble_coeff={coefficient}: the way "
-            "back is no average of plans. Leave one of them out.",
+            self.backtrack_frames == 0 or coefficient is None,
+            f"policy.backtrack_frames={self.backtrack_frames} is not possible with temporal_ensemble_coeff="
+            f"{coefficient}: the way back is no average of plans. Leave one of them out.",
         )
         require(
             coefficient is None or -coefficient * (chunk - 1) <= _GREATEST_EXPONENT,
