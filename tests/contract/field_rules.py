@@ -212,6 +212,7 @@ POLICY = {
     "augment_mask_px": whole(0, 1024),
     "compare_masks": flag,
     "backtrack_frames": whole(0, 10_000),
+    "backtrack_stride": whole(1, 100).beside(backtrack_frames=5),
     "mask_key": feature_name,
     "main_camera": optional(feature_name),
     **dict.fromkeys(("withhold_mask", "target_token", "coordinate_channels", "optimizer_fused"), flag),

@@ -13,6 +13,7 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot_excav.errors import ConfigurationError, require, require_choice
 from lerobot_excav.policies.mask_act.backbone_weights import known_weights
 from lerobot_excav.policies.mask_act.features import (
+    MISSING_MASK_HINT,
     NORMALISED,
     check_features,
     check_normalization,
@@ -135,6 +136,9 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         default=0,
         low=0,
         high=10_000,
+    )
+    backtrack_stride: int = setting(
+        "Play one in so many actions of the way back, which makes it so many times as fast", default=1, low=1, high=100
     )
     n_obs_steps: int = setting("Frames that the policy sees at a time", default=1, choices=(1,))
 
@@ -389,12 +393,6 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
         if self.lr_schedule == "cosine":
             return CosineAnnealingWithWarmupSchedulerConfig(num_warmup_steps=warmup)
         return ConstantWithWarmupSchedulerConfig(num_warmup_steps=warmup) if warmup else None
-
-
-MISSING_MASK_HINT = (
-    "Record or generate demonstrations with the target mask (`lerobot-excav demos` writes it), name another feature "
-    "with --policy.mask_key, or train the no-condition variant with --policy.withhold_mask=true."
-)
 
 
 _ACTS_OWN = frozenset(field.name for field in fields(ACTConfig))

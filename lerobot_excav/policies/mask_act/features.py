@@ -13,6 +13,11 @@ NORMALISED = tuple(
 )  # kinds whose normalisation has to be told
 _MOST = 100_000  # entries of a vector, or pixels along an axis: more is a slip of the keyboard
 
+MISSING_MASK_HINT = (
+    "Record or generate demonstrations with the target mask (`lerobot-excav demos` writes it), name another feature "
+    "with --policy.mask_key, or train the no-condition variant with --policy.withhold_mask=true."
+)
+
 
 def check_features(field: str, features: Any) -> None:
     """Check features by name, None or empty where they are not known yet.

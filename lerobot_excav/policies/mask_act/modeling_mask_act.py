@@ -65,7 +65,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self._command_changes = CommandChanges(meta)
         self.model = MaskACTNetwork(config)
         self._watch = TargetWatch()
-        self._way_back = WayBack(config.backtrack_frames)
+        self._way_back = WayBack(config.backtrack_frames, config.backtrack_stride)
         # LeRobot's `drop_queued_actions` clears what has this name.
         self._action_queue = (
             ActionQueue(resolved(config.n_action_steps))

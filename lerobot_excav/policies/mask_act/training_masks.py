@@ -14,7 +14,8 @@ from torch import Tensor
 from torchvision.transforms.functional import to_tensor
 
 from lerobot_excav.errors import DatasetError, require
-from lerobot_excav.policies.mask_act.configuration_mask_act import MISSING_MASK_HINT, MaskACTConfig
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.features import MISSING_MASK_HINT
 from lerobot_excav.policies.mask_act.views import Batch
 
 LOG = logging.getLogger(__name__)

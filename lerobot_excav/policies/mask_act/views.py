@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 
 from lerobot_excav.errors import require
-from lerobot_excav.policies.mask_act.configuration_mask_act import MISSING_MASK_HINT, MaskACTConfig
-from lerobot_excav.policies.mask_act.features import require_mask_shape
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.features import MISSING_MASK_HINT, require_mask_shape
 
 Batch = dict[str, Any]
 

@@ -14,10 +14,11 @@ class WayBack:
 
     Args:
         most_frames: Longest way that is gone back; after a longer one the other target is no change of mind.
+        stride: One in so many actions of the way is played, the first one always: so many times as fast.
     """
 
-    def __init__(self, most_frames: int) -> None:
-        self._most_frames = most_frames
+    def __init__(self, most_frames: int, stride: int = 1) -> None:
+        self._most_frames, self._stride = most_frames, stride
         self.clear()
 
     def clear(self) -> None:
@@ -49,8 +50,8 @@ class WayBack:
             if is_other[number]:
                 self._ways[number] = []
                 if 0 < len(way) <= self._most_frames:
-                    led[number] = way[::-1]
-                    self._left[number] = len(way)
+                    led[number] = way[:: self._stride][::-1]
+                    self._left[number] = len(led[number])
         return led
 
     def note(self, actions: Tensor) -> None:

@@ -94,6 +94,17 @@ def test_after_a_longer_way_another_target_is_no_change_of_mind(awake, batch, ma
     torch.testing.assert_close(play(agent, turned, 1)[0, 0], expected, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize(("steps", "expected"), [(7, [6, 3, 0]), (6, [3, 0]), (1, [0])])
+def test_a_fast_way_back_leaves_actions_out_but_never_the_first(awake, batch, mask, steps, expected):
+    agent = awake(backtrack_frames=20, backtrack_stride=3, n_action_steps=4)
+    there = play(agent, shown(batch, mask, FIRST), steps)
+    turned = shown(batch, mask, OTHER)
+    plan = agent.predict_action_chunk(turned)
+    back = play(agent, turned, len(expected) + 1)
+    torch.testing.assert_close(back[0, :-1], there[0, expected], rtol=0, atol=0)
+    torch.testing.assert_close(back[0, -1], plan[0, 0], rtol=1e-5, atol=1e-5)
+
+
 PLACES = st.lists(st.sampled_from([None, 0, 1, 2]), min_size=1, max_size=40)
 
 
