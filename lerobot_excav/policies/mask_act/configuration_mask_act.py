@@ -270,11 +270,6 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             "ensemble needs a plan at every step. Leave n_action_steps unset or set it to 1.",
         )
         require(
-            self.backtrack_frames == 0 or coefficient is None,
-            f"policy.backtrack_frames={self.backtrack_frames} is not possible with temporal_ensemble_coeff="
-            f"{coefficient}: the way back is no average of plans. Leave one of them out.",
-        )
-        require(
             coefficient is None or -coefficient * (chunk - 1) <= _GREATEST_EXPONENT,
             f"policy.temporal_ensemble_coeff={coefficient} with chunk_size={chunk} weighs the newest plan beyond "
             f"single precision; give {-_GREATEST_EXPONENT / max(chunk - 1, 1):.3g} or more. ACT's is 0.01.",

@@ -173,25 +173,21 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self.eval()
         mask = target_mask(self.config, batch)
         changed = self._watch.changed(mask)
+        if not self.config.backtrack_frames:
+            return self._planned(batch, changed)
+        if self._action_queue.knows_nobody:  # somebody else may have moved the machine since the last plan
+            self._way_back.clear()
+        changed |= self._way_back.look(mask).to(changed.device)
+        return self._way_back.led(self._planned(batch, changed))
+
+    def _planned(self, batch: Batch, changed: Tensor) -> Tensor:
+        """Return the next action of each environment's plan, a new one where its target has `changed`."""
         if isinstance(self._action_queue, TemporalEnsembles):
             return self._action_queue.update(self.predict_action_chunk(batch), changed)
-        if self.config.backtrack_frames:
-            changed = self._led_back(self._action_queue, mask, changed)
         stale = self._action_queue.stale(changed)
         if stale.any():
             self._action_queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
-        actions = self._action_queue.pop()
-        if self.config.backtrack_frames:
-            self._way_back.note(actions)
-        return actions
-
-    def _led_back(self, queue: ActionQueue, mask: Tensor, changed: Tensor) -> Tensor:
-        """Lead environments back whose mask shows another target; return which of the others need a new plan."""
-        if queue.knows_nobody:  # somebody else may have moved the machine since the last plan
-            self._way_back.clear()
-        for number, actions in self._way_back.begin(mask).items():
-            queue.lead(number, actions)
-        return changed & ~self._way_back.is_leading.to(changed.device)
+        return self._action_queue.pop()
 
     def _augmented(self, batch: Batch, mask: Tensor) -> tuple[Batch, Tensor]:
         """Return batch and mask for one training step, by the `augment_...` settings."""

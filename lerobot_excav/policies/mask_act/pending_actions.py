@@ -1,7 +1,6 @@
 """What each environment of a batch has left of its plan."""
 
 from collections import deque
-from collections.abc import Sequence
 from functools import partial
 
 import torch
@@ -70,10 +69,6 @@ class ActionQueue:
         for number, plan in zip(stale.nonzero().flatten().tolist(), chunk, strict=True):
             self._plans[number] = deque(plan[: self._n_action_steps])
 
-    def lead(self, number: int, actions: Sequence[Tensor]) -> None:
-        """Replace the plan of an environment by actions, each (A,), all of which are played."""
-        self._plans[number] = deque(actions)
-
     def pop(self) -> Tensor:
         """Return the next action of every environment, shape (B, A)."""
         require(bool(self._plans), "the action queue is empty; put a plan for every environment first.")
@@ -94,6 +89,11 @@ class TemporalEnsembles:
     def clear(self) -> None:
         """Drop every average."""
         self._averages: list[ACTTemporalEnsembler] = []
+
+    @property
+    def knows_nobody(self) -> bool:
+        """Whether no environment has had a plan since all were dropped."""
+        return not self._averages
 
     def __len__(self) -> int:
         """Return the number of actions that need no new plan: none."""

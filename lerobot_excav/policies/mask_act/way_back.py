@@ -1,5 +1,7 @@
 """The way that each environment has come since its target was shown, to be gone back when another one is."""
 
+from collections import deque
+
 import torch
 from torch import Tensor
 
@@ -24,40 +26,45 @@ class WayBack:
     def clear(self) -> None:
         """Forget all ways."""
         self._ways: list[list[Tensor]] = []
-        self._left: list[int] = []
+        self._led: list[deque[Tensor]] = []
+        self._has_arrived: list[bool] = []
         self._mask: Tensor | None = None
 
     @property
     def is_leading(self) -> Tensor:
-        """Which environments are on their way back, bool (B,)."""
-        return torch.tensor([left > 0 for left in self._left], dtype=torch.bool)
+        """Which environments are on their way back, bool (B,); meanwhile their masks are not looked at."""
+        return torch.tensor([bool(led) for led in self._led], dtype=torch.bool)
 
-    def begin(self, mask: Tensor) -> dict[int, list[Tensor]]:
-        """Return the actions back to the start, each (A,), by environment whose mask shows another target.
+    def look(self, mask: Tensor) -> Tensor:
+        """Begin the way back where a mask, (B, 1, H, W), shows another target.
 
-        They are to be played from now on, all of them; meanwhile masks, (B, 1, H, W), are not looked at.
+        Returns:
+            Which environments have come to the end of their way back, and need a plan from there, bool (B,).
         """
         if self._mask is None:
             self._mask = mask.clone()
-            self._ways, self._left = [[] for _ in mask], [0] * len(mask)
+            self._ways, self._led = [[] for _ in mask], [deque() for _ in mask]
+            self._has_arrived = [False for _ in mask]
         shown = mask.flatten(1).any(dim=1)
         is_other = shown & self._mask.flatten(1).any(dim=1) & ~((self._mask > 0) & (mask > 0)).flatten(1).any(dim=1)
-        led = {}
         for number, way in enumerate(self._ways):
-            if self._left[number] or not shown[number]:
+            if self._led[number] or not shown[number]:
                 continue
             self._mask[number] = mask[number]
             if is_other[number]:
+                if len(way) <= self._most_frames:
+                    self._led[number] = deque(way[:: self._stride][::-1])
                 self._ways[number] = []
-                if 0 < len(way) <= self._most_frames:
-                    led[number] = way[:: self._stride][::-1]
-                    self._left[number] = len(led[number])
-        return led
+        arrived, self._has_arrived = torch.tensor(self._has_arrived), [False for _ in self._has_arrived]
+        return arrived
 
-    def note(self, actions: Tensor) -> None:
-        """Take down what is played in this step, (B, A)."""
-        for number, action in enumerate(actions):
-            if self._left[number]:
-                self._left[number] -= 1
+    def led(self, planned: Tensor) -> Tensor:
+        """Return what is played in this step, (B, A): the way back where one is gone, else what is planned."""
+        actions = planned.clone()
+        for number, led in enumerate(self._led):
+            if led:
+                actions[number] = led.popleft()
+                self._has_arrived[number] = not led
             elif len(self._ways[number]) <= self._most_frames:  # one more than is gone back says that it is too long
-                self._ways[number].append(action.clone())
+                self._ways[number].append(planned[number].clone())
+        return actions

@@ -5,7 +5,6 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.way_back import WayBack
 
 from .conftest import MASK
@@ -79,9 +78,14 @@ def test_after_a_reset_and_after_dropped_plans_there_is_no_way_to_go_back(awake,
         torch.testing.assert_close(play(agent, turned, 4)[0], plan[0, :4], rtol=1e-5, atol=1e-5)
 
 
-def test_an_ensemble_has_no_way_back(config):
-    with pytest.raises(ConfigurationError, match="backtrack_frames=9 is not possible with temporal_ensemble_coeff"):
-        config(backtrack_frames=9, temporal_ensemble_coeff=0.01)
+def test_an_ensemble_goes_back_too_and_begins_a_new_average_there(awake, batch, mask):
+    agent = awake(backtrack_frames=20, temporal_ensemble_coeff=0.01)
+    there = play(agent, shown(batch, mask, FIRST), 5)
+    turned = shown(batch, mask, OTHER)
+    back = play(agent, turned, 5)
+    torch.testing.assert_close(back[0], there[0].flip(0), rtol=0, atol=0)
+    plan = agent.predict_action_chunk(turned)
+    torch.testing.assert_close(play(agent, turned, 1)[0, 0], plan[0, 0], rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize(("steps", "goes_back"), [(5, True), (6, False)])
@@ -111,19 +115,18 @@ PLACES = st.lists(st.sampled_from([None, 0, 1, 2]), min_size=1, max_size=40)
 @given(PLACES)
 def test_the_way_back_ends_where_the_way_began_whatever_is_shown(places):
     """Each action is a step that the opposite one undoes, and a step is named by its number."""
-    way_back, stack, queue = WayBack(100), [], []
+    way_back, stack, was_leading = WayBack(100), [], False
     for number, place in enumerate(places):
         mask = torch.zeros(1, 1, 1, 3)
         if place is not None:
             mask[..., place] = 1.0
-        for actions in way_back.begin(mask).values():
-            queue = list(actions)
-            assert [int(action) for action in queue] == stack[::-1]
-        if queue:
-            action = queue.pop(0)
-            assert int(action) == stack.pop()
+        has_arrived = bool(way_back.look(mask))
+        is_leading = bool(way_back.is_leading)
+        assert has_arrived is (was_leading and not is_leading)
+        played = int(way_back.led(torch.tensor([[float(number)]])))
+        if is_leading:
+            assert played == stack.pop()
         else:
-            assert not way_back.is_leading.any()
-            action = torch.tensor([float(number)])
+            assert played == number
             stack.append(number)
-        way_back.note(action[None])
+        was_leading = is_leading
