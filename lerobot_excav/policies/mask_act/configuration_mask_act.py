@@ -20,6 +20,7 @@ from lerobot_excav.policies.mask_act.features import (
     require_mask_shape,
     require_moved_mask,
     require_rgb,
+    require_way_back,
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
@@ -262,6 +263,7 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
             f"policy.actions_per_token={k} must divide chunk_size={chunk}; allowed: "
             f"{', '.join(str(d) for d in range(1, chunk + 1) if chunk % d == 0)}.",
         )
+        require_way_back(self.backtrack_frames, self.backtrack_stride, withheld=self.withhold_mask)
         steps, coefficient = resolved(self.n_action_steps), self.temporal_ensemble_coeff
         require(steps <= chunk, f"policy.n_action_steps={steps} is not possible; give 1 to chunk_size={chunk}.")
         require(

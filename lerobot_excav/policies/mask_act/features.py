@@ -76,6 +76,22 @@ def check_normalization(field: str, mapping: Mapping[str, NormalizationMode]) ->
     )
 
 
+def require_way_back(frames: int, stride: int, *, withheld: bool) -> None:
+    """Check that the settings of the way back have an effect.
+
+    Raises:
+        ConfigurationError: They have none.
+    """
+    require(
+        stride == 1 or frames > 0,
+        f"policy.backtrack_stride={stride} has no effect with backtrack_frames=0; give the longest way back.",
+    )
+    require(
+        not (frames and withheld),
+        f"policy.backtrack_frames={frames} has no effect with withhold_mask=True, which shows no target; give 0.",
+    )
+
+
 def require_rgb(key: str, shape: tuple[int, ...]) -> None:
     """Check that a camera has three channels.
 

@@ -175,9 +175,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         changed = self._watch.changed(mask)
         if not self.config.backtrack_frames:
             return self._planned(batch, changed)
-        if self._action_queue.knows_nobody:  # somebody else may have moved the machine since the last plan
-            self._way_back.clear()
-        changed |= self._way_back.look(mask).to(changed.device)
+        arrived = self._way_back.look(mask).to(changed.device)
+        changed = (changed & ~self._way_back.is_leading.to(changed.device)) | arrived
         return self._way_back.led(self._planned(batch, changed))
 
     def _planned(self, batch: Batch, changed: Tensor) -> Tensor:

@@ -48,11 +48,6 @@ class ActionQueue:
         """Drop every plan."""
         self._plans: list[deque[Tensor]] = []
 
-    @property
-    def knows_nobody(self) -> bool:
-        """Whether no environment has had a plan since all were dropped."""
-        return not self._plans
-
     def __len__(self) -> int:
         """Return the number of actions that every environment has left."""
         return min(map(len, self._plans), default=0)
@@ -89,11 +84,6 @@ class TemporalEnsembles:
     def clear(self) -> None:
         """Drop every average."""
         self._averages: list[ACTTemporalEnsembler] = []
-
-    @property
-    def knows_nobody(self) -> bool:
-        """Whether no environment has had a plan since all were dropped."""
-        return not self._averages
 
     def __len__(self) -> int:
         """Return the number of actions that need no new plan: none."""

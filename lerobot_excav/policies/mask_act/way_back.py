@@ -5,6 +5,9 @@ from collections import deque
 import torch
 from torch import Tensor
 
+STILL_FRAMES = 5
+"""How long a mask has to stand still before another one is a change of mind [frames] (kind: guess)."""
+
 
 class WayBack:
     """Leads an environment back along its own actions when its mask shows another target soon after the last one.
@@ -12,7 +15,8 @@ class WayBack:
     A policy that has seen no change of mind knows the states on the way to one target, not those from there to another
     one. At the end of the way back it is where it began, and there it knows what to do. That holds for actions that are
     positions; rates in the opposite order lead elsewhere. A mask of which a part lies on the one before shows the same
-    target, moved or seen better, and an empty one shows none.
+    target, moved or seen better, and an empty one shows none. Only what comes after a mask that stood still is a change
+    of mind: one that jitters, as a segmenter's that looks at every frame, may lie beside itself from frame to frame.
 
     Args:
         most_frames: Longest way that is gone back; after a longer one the other target is no change of mind.
@@ -28,7 +32,9 @@ class WayBack:
         self._ways: list[list[Tensor]] = []
         self._led: list[deque[Tensor]] = []
         self._has_arrived: list[bool] = []
-        self._mask: Tensor | None = None
+        self._still_frames: list[int] = []
+        self._mask: Tensor | None = None  # of the way
+        self._last: Tensor | None = None  # of the frame before
 
     @property
     def is_leading(self) -> Tensor:
@@ -41,10 +47,11 @@ class WayBack:
         Returns:
             Which environments have come to the end of their way back, and need a plan from there, bool (B,).
         """
-        if self._mask is None:
-            self._mask = mask.clone()
+        if self._mask is None or self._last is None:
+            self._mask, self._last = mask.clone(), mask.clone()
             self._ways, self._led = [[] for _ in mask], [deque() for _ in mask]
-            self._has_arrived = [False for _ in mask]
+            self._has_arrived, self._still_frames = [False for _ in mask], [0 for _ in mask]
+        is_still, self._last = (self._last == mask).flatten(1).all(dim=1), mask.clone()
         shown = mask.flatten(1).any(dim=1)
         is_other = shown & self._mask.flatten(1).any(dim=1) & ~((self._mask > 0) & (mask > 0)).flatten(1).any(dim=1)
         for number, way in enumerate(self._ways):
@@ -52,9 +59,11 @@ class WayBack:
                 continue
             self._mask[number] = mask[number]
             if is_other[number]:
-                if len(way) <= self._most_frames:
+                if len(way) <= self._most_frames and self._still_frames[number] >= STILL_FRAMES:
                     self._led[number] = deque(way[:: self._stride][::-1])
                 self._ways[number] = []
+        counts = zip(self._still_frames, is_still.tolist(), strict=True)
+        self._still_frames = [count + 1 if still else 0 for count, still in counts]
         arrived, self._has_arrived = torch.tensor(self._has_arrived), [False for _ in self._has_arrived]
         return arrived
 
