@@ -14,6 +14,7 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.run import Run
 from lerobot_excav.evaluation.statistics import (
     Interval,
+    cautious_correlation_of_rates,
     difference_of_rates,
     mcnemar_exact,
     newcombe_interval,
@@ -127,9 +128,7 @@ def _no_surer_than_scenes(
     turns signs around: that of m scenes that differ is 2 / 2**m.
     """
     first, second = (wilson_interval(round(rates.sum()), len(rates)) for rates in (before, after))
-    varies = before.std() > 0.0 < after.std()
-    correlation = float(np.corrcoef(before, after)[0, 1]) if varies else 0.0
-    least = difference_of_rates(first, second, correlation=correlation)
+    least = difference_of_rates(first, second, correlation=cautious_correlation_of_rates(before, after))
     low = min(difference.low, difference.estimate - (least.estimate - least.low))
     high = max(difference.high, difference.estimate + (least.high - least.estimate))
     least_p = min(1.0, 2.0 ** (1 - int(np.count_nonzero(before != after))))

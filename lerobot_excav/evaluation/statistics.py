@@ -89,7 +89,7 @@ def difference_of_rates(first: Interval, second: Interval, *, correlation: float
     return Interval(estimate=difference, low=max(-1.0, difference - below), high=min(1.0, difference + above))
 
 
-def _cautious_correlation(both: int, first_only: int, second_only: int, neither: int) -> float:
+def _cautious_correlation(both: float, first_only: float, second_only: float, neither: float) -> float:
     """Correlate two truth values, a positive correlation corrected for continuity; 0 where one never changes."""
     n = both + first_only + second_only + neither
     excess: float = both * neither - first_only * second_only
@@ -98,6 +98,13 @@ def _cautious_correlation(both: int, first_only: int, second_only: int, neither:
     firsts, seconds = both + first_only, both + second_only
     spread = math.sqrt(firsts * (n - firsts) * seconds * (n - seconds))
     return excess / spread if spread else 0.0
+
+
+def cautious_correlation_of_rates(first: NDArray[Any], second: NDArray[Any]) -> float:
+    """Correlate two rates, each (scenes,), corrected as that of truth values is, which are rates of one seed."""
+    n = len(first)
+    both, firsts, seconds = float(first @ second), float(first.sum()), float(second.sum())
+    return _cautious_correlation(both, firsts - both, seconds - both, n - firsts - seconds + both)
 
 
 def mcnemar_exact(first_only: int, second_only: int) -> float:

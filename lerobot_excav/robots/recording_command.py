@@ -121,18 +121,31 @@ def _wrong_rates(command: Any, fps: int) -> Iterator[tuple[str, str]]:
 
 
 def _rates_beside(command: Any, rates: Sequence[int]) -> Iterator[tuple[str, str]]:
-    """Yield every rate of the command that is none of a machine's, in words, and the flag that mends it."""
+    """Yield every rate of the command that does not fit a machine or its own recording, and the flag that mends it."""
     times = getattr(command, "interpolation_multiplier", 1)
-    sent = getattr(command, "fps", None)
+    fps = getattr(command, "fps", None)
     recorded = recorded_dataset(command)
-    if sent is not None and sent * times not in rates:
-        flags = "--interpolation_multiplier=1 " * (times != 1)
-        yield f"it sends {sent * times:g}", f"{flags}--fps={_nearest(sent * times, rates)}"
+    if fps is not None and recorded is not None and times != 1:
+        words = f"--interpolation_multiplier={times} stores every observation {times} times"
+        yield words, "--interpolation_multiplier=1"
+        times = 1
+    if fps is not None and fps * times not in rates:
+        yield f"it sends {fps * times:g}", _mended_rate(fps, times, rates)
     if recorded is not None and recorded.fps not in rates:
         yield f"it records {recorded.fps} frames a second", f"--dataset.fps={_nearest(recorded.fps, rates)}"
+    elif recorded is not None and fps is not None and recorded.fps != fps:
+        yield f"it records {recorded.fps} frames a second of {fps:g} that pass", f"--dataset.fps={fps:g}"
     replayed = _replayed_rate(command)
     if replayed is not None and replayed not in rates:
         yield f"the dataset was recorded at {replayed} frames a second", "a recording at one of its rates"
+
+
+def _mended_rate(fps: float, times: int, rates: Sequence[int]) -> str:
+    """Return the flags that bring a command to one of the rates; that of a policy stays if there is a way."""
+    fitting = [each for each in range(1, max(rates) + 1) if fps * each in rates]
+    if fitting:
+        return f"--interpolation_multiplier={_nearest(times, fitting)}"
+    return f"--fps={_nearest(fps * times, rates)}" + " --interpolation_multiplier=1" * (times != 1)
 
 
 def _nearest(rate: float, rates: Sequence[int]) -> int:

@@ -69,6 +69,17 @@ def test_equal_rates_differ_by_nothing_whatever_the_number_of_trainings(make_run
     assert target.p_value > 0.5
 
 
+def test_runs_that_end_alike_are_no_closer_than_their_scenes_allow(make_run, scoop_line):
+    """As wide as of a single training each, whose interval is Newcombe's."""
+    outcomes = np.arange(50) % 2 == 0
+    widths = []
+    for seeds in (1, 3):
+        runs = [make_run(f"{name}{seeds}", *(hits(scoop_line, outcomes) for _ in range(seeds))) for name in "ab"]
+        difference = compare(*runs)[0].difference
+        widths.append(difference.high - difference.low)
+    assert widths[1] >= 0.99 * widths[0] > 0.0
+
+
 def test_a_difference_in_few_scenes_is_no_surer_than_they_allow(make_run, scoop_line):
     first = make_run("a", *(hits(scoop_line, np.ones(6)) for _ in range(3)))
     second = make_run("b", hits(scoop_line, [0, 0, 0, 0, 0, 1]), *(hits(scoop_line, np.zeros(6)) for _ in range(2)))

@@ -9,13 +9,16 @@ from types import SimpleNamespace
 import draccus
 import numpy as np
 import pytest
+from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
+from lerobot.robots import make_robot_from_config
 from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_teleoperate
 from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers the types
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
 from lerobot_excav.robots.recording_command import require_command_for_machine
 from lerobot_excav.scripts.main import main
 
@@ -164,11 +167,56 @@ def test_a_rate_that_does_not_divide_that_of_the_wire_and_a_lossy_mask_are_refus
         require_command_for_machine(config.robot, rates=RATES, has_mask=has_mask)
 
 
+MASK = "{goal: {type: mask, of: main, source: manual, options: x.toml, width: 8, height: 8}}"
+
+
+@pytest.mark.parametrize("cameras", [CAMERAS.partition("=")[2], MASK], ids=["by its name", "by its type"])
+def test_a_robot_whose_mask_would_be_blurred_is_not_even_made(tmp_path, cameras):
+    robot = ["--robot.type=excavator_testbed", f"--robot.calibration_dir={tmp_path}", f"--robot.cameras={cameras}"]
+    teleop = ["--teleop.type=leftward", f"--teleop.calibration_dir={tmp_path}"]
+    data = ["--dataset.repo_id=a/b", "--dataset.single_task=dig", "--dataset.fps=10"]
+    config = draccus.parse(lerobot_record.RecordConfig, args=[*robot, *teleop, *data])
+    with pytest.raises(ValueError, match=r"blurs the target mask.*Give --dataset\.video=false"):
+        make_robot_from_config(config.robot)
+
+
+@dataclass
+class Rollout:
+    """The fields of LeRobot's configuration that count; its own loads a policy."""
+
+    robot: ExcavatorTestbedConfig
+    fps: float = 10.0
+    interpolation_multiplier: int = 1
+    dataset: object = None
+
+
+@pytest.mark.parametrize(
+    ("changes", "advice"),
+    [
+        ({"fps": 50.0, "dataset": DatasetRecordConfig(fps=10, video=False)}, r"Give --dataset\.fps=50$"),
+        (
+            {"interpolation_multiplier": 5, "dataset": DatasetRecordConfig(fps=10, video=False)},
+            r"stores every observation 5 times.*Give --interpolation_multiplier=1$",
+        ),
+        ({"interpolation_multiplier": 3}, r"it sends 30\..*Give --interpolation_multiplier=1$"),
+        ({"fps": 30.0}, r"it sends 30\..*Give --fps=25$"),
+        ({"fps": 30.0, "interpolation_multiplier": 2}, r"Give --fps=50 --interpolation_multiplier=1$"),
+        ({"interpolation_multiplier": 5}, None),
+        ({"fps": 25.0, "dataset": DatasetRecordConfig(fps=25, video=False)}, None),
+    ],
+)
+def test_a_rollout_is_sent_and_recorded_at_one_rate(changes, advice):
+    command = Rollout(ExcavatorTestbedConfig(), **changes)
+    if advice is None:
+        require_command_for_machine(command.robot, rates=RATES, has_mask=False)
+        return
+    with pytest.raises(ConfigurationError, match=advice):
+        require_command_for_machine(command.robot, rates=RATES, has_mask=False)
+
+
 def test_a_robot_is_not_even_made_for_a_command_of_another_rate(tmp_path):
     robot = ["--robot.type=excavator_testbed", f"--robot.calibration_dir={tmp_path}"]
     teleop = ["--teleop.type=leftward", f"--teleop.calibration_dir={tmp_path}"]
     config = draccus.parse(lerobot_teleoperate.TeleoperateConfig, args=[*robot, *teleop])  # LeRobot's own 60
-    from lerobot.robots import make_robot_from_config
-
     with pytest.raises(ValueError, match=r"takes 10, 25, 50 actions a second: it sends 60\..*Give --fps=50$"):
         make_robot_from_config(config.robot)

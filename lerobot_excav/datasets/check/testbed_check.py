@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.datasets.check.episode_check import ACTION_MARGIN
 from lerobot_excav.datasets.check.quality_report import Findings, QualityReport
+from lerobot_excav.datasets.check.readability import opening_problem
 from lerobot_excav.datasets.format.alignment_columns import (
     ALIGNMENT_COLUMNS,
     IMAGE_AGE_KEY,
@@ -18,6 +19,7 @@ from lerobot_excav.datasets.format.alignment_columns import (
 )
 from lerobot_excav.datasets.format.dataset_info import DatasetInfo
 from lerobot_excav.datasets.format.frame_files import EpisodeRows, iterate_rows
+from lerobot_excav.datasets.format.metadata import missing_files, read_episode_metadata, read_statistics, read_tasks
 from lerobot_excav.datasets.format.schema import ACTION_KEY, MASK_KEY, PAIR_KEY, STATE_KEY
 
 _READ = (ACTION_KEY, STATE_KEY, *ALIGNMENT_COLUMNS)
@@ -44,20 +46,29 @@ def check_testbed_recording(root: Path, info: DatasetInfo, episodes: Collection[
     if missing:
         findings.dataset.append(f"the column {missing[0]} is missing")
         return findings.report(has_pairs=False)
+    metadata = findings.attempt(read_episode_metadata, root, info)
+    findings.attempt(read_tasks, root, info)
+    findings.attempt(read_statistics, root)
+    findings.dataset += findings.attempt(lambda: list(missing_files(root, info, metadata or []))) or []
     for rows in iterate_rows(root, info, _READ, episodes=episodes, report=findings.note):
         findings.episodes[rows.index] = list(rows.problems) or list(_problems(rows))
         findings.lengths[rows.index] = rows.table.num_rows
+    if not findings.dataset:
+        _check_opening(root, info, findings)
     if MASK_KEY in info.features and not findings.dataset:
         _check_masks(root, findings)
     return findings.report(has_pairs=False)
 
 
+def _check_opening(root: Path, info: DatasetInfo, findings: Findings) -> None:
+    """Let LeRobot open what is sound."""
+    lengths = {index: findings.lengths[index] for index in findings.sound()}
+    if lengths and (problem := opening_problem(root, info, lengths, is_whole=len(lengths) == info.total_episodes)):
+        findings.dataset.append(problem)
+
+
 def _problems(rows: EpisodeRows) -> Iterator[str]:
     columns = {key: np.array(rows.table[key].to_pylist()) for key in _READ}
-    for key in (ACTION_KEY, STATE_KEY):
-        finite = np.isfinite(columns[key]).all(axis=1)
-        if not finite.all():
-            yield f"{key} is not finite at frame {int(np.argmin(finite))}"
     most = 1.0 + 2.0 * ACTION_MARGIN
     if (greatest := float(np.nanmax(np.abs(columns[ACTION_KEY])))) > most:
         yield f"an action reaches {greatest:.3g}; allowed are -1 to 1"
@@ -79,7 +90,11 @@ def _check_masks(root: Path, findings: Findings) -> None:
     dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav")
     for index in findings.sound():
         first = int(dataset.meta.episodes[index]["dataset_from_index"])
-        mask = dataset[first][MASK_KEY].numpy()
+        try:
+            mask = dataset[first][MASK_KEY].numpy()
+        except Exception as error:  # of whatever library reads pictures
+            findings.episodes[index].append(f"the target mask of frame 0 cannot be read: {error}")
+            continue
         if not mask.any():
             findings.episodes[index].append("the target mask is empty at frame 0")
         elif not np.isin(mask, (0.0, 1.0)).all():

@@ -6,6 +6,7 @@ from pathlib import Path
 from lerobot.cameras import CameraConfig
 from lerobot.robots import RobotConfig
 
+from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
 from lerobot_excav.errors import require, shown
 from lerobot_excav.loopback import is_loopback
 from lerobot_excav.setting import check_settings, setting
@@ -67,6 +68,13 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
             self.dead_man != "always" or is_loopback(host),
             f"robot.address={self.address!r} with robot.dead_man='always' lets the machine at {host} move while nobody "
             "watches; that is for an emulator on this computer (127.0.0.1). Give robot.dead_man=gamepad",
+        )
+
+    @property
+    def has_mask(self) -> bool:
+        """Whether one of the cameras shows a target mask, by its name or by its type."""
+        return "target_mask" in self.cameras or any(
+            isinstance(each, MaskCameraConfig) for each in self.cameras.values()
         )
 
     @property

@@ -1,6 +1,10 @@
 """What is wrong with a recording of a real machine is found, its late frames counted."""
 
+import shutil
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
@@ -105,3 +109,23 @@ def test_what_is_wrong_with_an_episode_is_said(recording, change, problem):
 
 def test_the_episodes_asked_for_are_checked(recording):
     assert check_dataset(recording(), episodes=[2]).episodes["episode_index"].tolist() == [2]
+
+
+@pytest.mark.parametrize("lost", ["meta/episodes", "meta/tasks.parquet", "meta/stats.json", "data"])
+def test_a_recording_that_lacks_a_part_does_not_pass(recording, lost):
+    root = recording()
+    path = root / lost
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    assert not check_dataset(root).has_passed
+
+
+def test_a_mask_that_is_no_picture_is_a_problem_and_no_error(recording):
+    root = recording()
+    (path,) = root.glob("data/*/*.parquet")
+    table = pq.read_table(path)
+    place = table.column_names.index("observation.images.target_mask")
+    column = table.column(place)
+    broken = pa.array([{"bytes": b"no picture", "path": None}] * len(column), type=column.type)
+    pq.write_table(table.set_column(place, table.schema.field(place), broken), path)
+    report = check_dataset(root)
+    assert not report.has_passed
