@@ -47,7 +47,7 @@ def judge(found: Obedience) -> Verdict:
             reason=f"the machine acts after {acted:.0f} % of the masks only (less than {100.0 * LEAST_ACTED:.0f} %)",
         )
     if found.compared_scenes < LEAST_SCENES or found.slope is None:
-        few = f"{found.compared_scenes} scenes with at least two masks acted on are too few; {LEAST_SCENES} are needed"
+        few = f"{found.compared_scenes} scenes with at least two masks to act on are too few; {LEAST_SCENES} are needed"
         return Verdict(verdict=UNDECIDED, reason=few)
     low, high, slope = found.slope.low, found.slope.high, found.slope.estimate
     shown = f"the slope of {slope:.2f} [{low:.2f}, {high:.2f}]"

@@ -40,4 +40,4 @@ def test_who_seldom_acts_is_out_of_support():
 def test_scenes_without_two_places_to_compare_do_not_count():
     judged = judge(found(0.9, 1.0, 1.1, compared_scenes=3))
     assert judged.verdict == UNDECIDED
-    assert judged.reason.startswith("3 scenes with at least two masks acted on")
+    assert judged.reason.startswith("3 scenes with at least two masks to act on")
