@@ -41,11 +41,7 @@ def require_fitting_command(robot_config: Any) -> Any | None:
     if command is None:
         return None
     faults = [*_wrong_rates(command, robot_config.fps), *_blurred_mask(command)]
-    if faults:
-        raise ConfigurationError(
-            f"this command and robot.fps={robot_config.fps} do not fit: {'; '.join(fault for fault, _ in faults)}. "
-            f"Nothing was recorded or moved. Give {' '.join(flag for _, flag in faults)}"
-        )
+    _require_none(faults, f"this command and robot.fps={robot_config.fps} do not fit")
     strategy = getattr(getattr(command, "strategy", None), "type", None)
     if strategy in UNLOGGED_STRATEGIES:
         logger.warning(
@@ -65,13 +61,8 @@ def require_command_for_machine(robot_config: Any, *, rates: Sequence[int], has_
     if command is None:
         return
     faults = [*_rates_beside(command, rates), *(_blurred_mask(command) if has_mask else ())]
-    if faults:
-        allowed = ", ".join(map(str, rates))
-        raise ConfigurationError(
-            f"this command does not fit the machine, which takes {allowed} actions a second: "
-            f"{'; '.join(fault for fault, _ in faults)}. Nothing was recorded or moved. "
-            f"Give {' '.join(flag for _, flag in faults)}"
-        )
+    takes = f"takes {', '.join(map(str, rates))} actions a second"
+    _require_none(faults, f"this command does not fit the machine, which {takes}")
 
 
 def operator_of(command: Any) -> str | None:
@@ -92,16 +83,35 @@ def recorded_dataset(command: Any) -> Any | None:
     return dataset if isinstance(dataset, DatasetRecordConfig) else None
 
 
+def _require_none(faults: Sequence[tuple[str, str]], words: str) -> None:
+    """Raise `ConfigurationError` if there are faults, each with the flag that mends it; `words` say of what."""
+    if faults:
+        raise ConfigurationError(
+            f"{words}: {'; '.join(fault for fault, _ in faults)}. Nothing was recorded or moved. "
+            f"Give {' '.join(flag for _, flag in faults)}"
+        )
+
+
+def _times(command: Any) -> int:
+    """Return how many actions are sent for one of a policy; a recording has to have one."""
+    return 1 if recorded_dataset(command) is not None else getattr(command, "interpolation_multiplier", 1)
+
+
+def _repeated_observations(command: Any) -> Iterator[tuple[str, str]]:
+    """Yield a multiplier that would store an observation several times, and the flag that mends it."""
+    times = getattr(command, "interpolation_multiplier", 1)
+    if times != 1 and recorded_dataset(command) is not None:
+        yield (
+            f"--interpolation_multiplier={times} stores every observation {times} times",
+            "--interpolation_multiplier=1",
+        )
+
+
 def _wrong_rates(command: Any, fps: int) -> Iterator[tuple[str, str]]:
     """Yield every rate of the command that is not the robot's, in words, and the flag that mends it."""
     if hasattr(command, "fps"):
-        times = getattr(command, "interpolation_multiplier", 1)
-        if times != 1 and recorded_dataset(command) is not None:
-            yield (
-                f"--interpolation_multiplier={times} stores every observation {times} times",
-                "--interpolation_multiplier=1",
-            )
-            times = 1
+        yield from _repeated_observations(command)
+        times = _times(command)
         if command.fps * times != fps:
             words = f" and --interpolation_multiplier={times}" * (times != 1)
             yield (
@@ -122,13 +132,9 @@ def _wrong_rates(command: Any, fps: int) -> Iterator[tuple[str, str]]:
 
 def _rates_beside(command: Any, rates: Sequence[int]) -> Iterator[tuple[str, str]]:
     """Yield every rate of the command that does not fit a machine or its own recording, and the flag that mends it."""
-    times = getattr(command, "interpolation_multiplier", 1)
-    fps = getattr(command, "fps", None)
-    recorded = recorded_dataset(command)
-    if fps is not None and recorded is not None and times != 1:
-        words = f"--interpolation_multiplier={times} stores every observation {times} times"
-        yield words, "--interpolation_multiplier=1"
-        times = 1
+    fps, times, recorded = getattr(command, "fps", None), _times(command), recorded_dataset(command)
+    if fps is not None:
+        yield from _repeated_observations(command)
     if fps is not None and fps * times not in rates:
         yield f"it sends {fps * times:g}", _mended_rate(fps, times, rates)
     if recorded is not None and recorded.fps not in rates:

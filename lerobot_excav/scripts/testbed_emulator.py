@@ -24,10 +24,8 @@ from lerobot_excav.errors import require
 from lerobot_excav.scripts.arguments import Arguments, EnvironmentChoice
 from lerobot_excav.setting import setting
 from lerobot_excav.testbed.address import USUAL_PORT
-from lerobot_excav.testbed.protocol import RATE_HZ
+from lerobot_excav.testbed.protocol import DIVIDING_RATES, RATE_HZ
 from lerobot_excav.testbed.safety import SOAK_S
-
-RATES = tuple(rate for rate in range(1, RATE_HZ + 1) if RATE_HZ % rate == 0)
 
 
 @dataclass(kw_only=True)
@@ -40,7 +38,7 @@ class TestbedEmulatorArguments(Arguments):
     port: int = setting("Port of the datagrams; 0 takes a free one", default=USUAL_PORT, low=0, high=65535)
     picture_port: int = setting("Port of the pictures; 0 takes a free one", default=47501, low=0, high=65535)
     first_scene: int = setting("Number of the first scene", default=0, low=0, high=LAST_SCENE)
-    pictures_hz: int = setting("Pictures a second of each camera", default=10, choices=RATES)
+    pictures_hz: int = setting("Pictures a second of each camera", default=10, choices=DIVIDING_RATES)
     soak_s: float = setting(
         "How long zero commands are watched after switching on [s]", default=SOAK_S, low=0.0, high=3600.0
     )

@@ -47,6 +47,9 @@ from lerobot_excav.errors import ExcavError
 RATE_HZ = 50
 """Datagrams a second, either way; frame rates of recordings divide it."""
 
+DIVIDING_RATES = tuple(rate for rate in range(1, RATE_HZ + 1) if RATE_HZ % rate == 0)
+"""Rates of pictures and of loops at which every one of them meets equally many datagrams [1/s]."""
+
 MAGIC = b"EXC1"
 AXES = ("swing", "boom", "arm", "bucket")
 

@@ -15,23 +15,7 @@ from validation.page_operator.pad import planned
 
 from ..console.conftest import Planted
 from .conftest import serving
-
-
-def comes(condition, limit_s):
-    deadline = time.monotonic() + limit_s
-    while not condition():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
-
-
-def until(condition, limit_s=20.0):
-    assert comes(condition, limit_s)
-
-
-def state_of(served):
-    return served.console.feed._moment.state
+from .driving import comes, hold, is_driven, state_of, until
 
 
 def brightness(page, canvas):
@@ -145,7 +129,7 @@ def drive_left(page, served, tries=6):
         page.evaluate("window.axes = [0, 0, 0, 0]")
         if state_of(served)["mode"] != "drive":
             page.locator("#drive").click()
-        if comes(lambda: state_of(served)["mode"] == "drive" and state_of(served)["ready"], 5.0):
+        if comes(lambda: is_driven(served), 5.0):
             page.evaluate("window.axes = [-1, 0, 0, 0]")
             if comes(lambda: state_of(served)["action"]["swing.vel"] == 1.0, 5.0):
                 return
@@ -210,9 +194,6 @@ def test_the_arms_page_has_its_own_legend_and_no_map(open_page):
         expect(page.locator("#left text")).to_have_text(["left", "right", "away", "back"])
         expect(page.locator("#plan")).to_be_hidden()
         expect(page.locator("#stage-field")).to_be_hidden()
-        page.locator("#drive").click()
-        until(lambda: state_of(served)["ready"])
         before = served.console.env.workcell.grasp_pos_w
-        page.keyboard.down("ArrowDown")  # towards the operator: up
-        until(lambda: served.console.env.workcell.grasp_pos_w[2] > before[2] + 0.02)
-        page.keyboard.up("ArrowDown")
+        # Towards the operator: up.
+        hold(page, served, "ArrowDown", until=lambda: served.console.env.workcell.grasp_pos_w[2] > before[2] + 0.02)

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 
 import pandas as pd
 import pytest
@@ -11,7 +10,7 @@ from playwright.sync_api import expect
 from lerobot_excav.datasets.check.quality_check import check_dataset
 
 from .conftest import serving
-from .test_page import comes, state_of, until
+from .driving import hold, state_of, until
 
 TRAIN = (
     *("--policy.type=mask_act", "--policy.preset=fast", "--policy.n_encoder_layers=1", "--policy.chunk_size=2"),
@@ -20,32 +19,10 @@ TRAIN = (
 )
 
 
-def hold(page, served, key, *, until_frames):
-    """Hold a key until so many frames are recorded.
-
-    On a busy machine the page may not be heard for a moment, which lets go of the sticks, or lose its connection, which
-    stops the machine: who drives lets go and begins again, as the page says.
-    """
-    deadline = time.monotonic() + 180.0
-    while state_of(served)["recording"]["frames"] < until_frames:
-        assert time.monotonic() < deadline, state_of(served)
-        if not is_driven(served):
-            page.locator("#drive").click()
-            until(lambda: is_driven(served), limit_s=60.0)
-        page.keyboard.down(key)
-        comes(lambda: state_of(served)["recording"]["frames"] >= until_frames or not is_driven(served), limit_s=60.0)
-        page.keyboard.up(key)
-
-
-def is_driven(served):
-    state = state_of(served)
-    return state["mode"] == "drive" and state["ready"]
-
-
 def record_episode(page, served):
     page.keyboard.press("KeyR")
     until(lambda: state_of(served)["recording"]["running"])
-    hold(page, served, "ArrowLeft", until_frames=5)
+    hold(page, served, "ArrowLeft", until=lambda: state_of(served)["recording"]["frames"] >= 5)
     page.keyboard.press("KeyF")
     expect(page.locator("#judged")).to_be_visible()
     page.keyboard.press("KeyK")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.datasets.check import quality_check
+from lerobot_excav.datasets.check import quality_check, readability
 
 from ..datasets import changes
 from ..datasets.damage import HARMFUL, HARMLESS, VIDEOS
@@ -154,7 +154,7 @@ def judge(change, root, folder, monkeypatch=None):
     before = digests(folder, own=DERIVED)
     if monkeypatch is not None and change.is_harmful:
         # To open what is left takes most of the time; what LeRobot alone objects to has a test of its own.
-        monkeypatch.setattr(quality_check, "opening_problem", lambda *_, **__: "")
+        monkeypatch.setattr(readability, "opening_problem", lambda *_, **__: "")
     require_right(change, run("qc", folder / "d", "--replays=0"))
     indexed = run("index", folder / "d")
     assert indexed.code in (0, 2)

@@ -64,6 +64,12 @@ def is_turning(link):
     return abs(state(link).joint_vel[0]) > 0.05
 
 
+def begin_to_turn(link, switch):
+    """Pass the start gate, and swing until the machine does."""
+    arm(link, switch)
+    drive(link, LEFT, lambda: is_turning(link))
+
+
 def stands(link):
     return abs(state(link).joint_vel[0]) < STANDS_RAD_S
 
@@ -77,8 +83,7 @@ def test_soak_it_stands_until_zero_commands_were_watched_for_the_whole_time_and_
         link.give(STILL)
         until(lambda: state(link).refusal is not Refusal.SOAK)
         assert time.monotonic() - began_s > 1.2  # all of it again
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
 
 
 def test_start_gate_a_stick_that_is_held_over_from_the_start_moves_nothing(switch):
@@ -88,14 +93,12 @@ def test_start_gate_a_stick_that_is_held_over_from_the_start_moves_nothing(switc
         assert len(seen) > GATE_SAMPLES
         assert {each.refusal for each in seen[5:]} == {Refusal.START_GATE}
         assert max(abs(each.joint_vel[0]) for each in seen) < STANDS_RAD_S
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
 
 
 def test_dead_man_letting_go_stops_it_while_the_stick_stays_and_holding_it_again_goes_on(switch):
     with emulated() as served, linked(served, switch) as link:
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
         switch.is_down = False
         drive(link, LEFT, lambda: state(link).refusal is Refusal.DEAD_MAN and stands(link))
         still = state(link).joint_pos[0]
@@ -129,8 +132,7 @@ def test_joint_limits_it_brakes_before_the_end_of_its_range_and_moves_back(switc
 
 def test_staleness_a_command_that_is_not_renewed_counts_as_zero(switch):
     with emulated() as served, linked(served, switch, hold_s=60.0) as link:  # a host that holds what it was told
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
         link.give(LEFT)
         given_s = time.monotonic()
         until(lambda: state(link).refusal is Refusal.STALE)
@@ -140,20 +142,17 @@ def test_staleness_a_command_that_is_not_renewed_counts_as_zero(switch):
 
 def test_link_watchdog_silence_stops_it_and_the_start_gate_is_asked_again(switch, monkeypatch):
     with emulated() as served, linked(served, switch) as link:
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
         monkeypatch.setattr(link, "_send", lambda: None)
         until(lambda: Refusal.NOT_HEARD in [refusal for _, refusal in served.emulator.refusals], 10.0 * WATCHDOG_S)
         monkeypatch.undo()
         drive(link, LEFT, lambda: state(link).refusal is Refusal.START_GATE and stands(link))
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
 
 
 def test_emergency_stop_is_latched_whatever_follows_and_released_with_everything_let_go(switch):
     with emulated() as served, linked(served, switch) as link:
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
         link.stop()
         drive(link, LEFT, lambda: state(link).refusal is Refusal.EMERGENCY_STOP and stands(link))
         link.release()  # with the dead-man held and the stick over: in vain
@@ -167,14 +166,12 @@ def test_a_machine_that_starts_again_at_its_address_asks_for_the_start_gate(swit
     with emulated() as served:
         port = served.emulator.address[1]
         with linked(served, switch) as link:
-            arm(link, switch)
-            drive(link, LEFT, lambda: is_turning(link))
+            begin_to_turn(link, switch)
             served.stop()
             with emulated(port=port):
                 until(lambda: _is_refused(link, Refusal.START_GATE))
                 assert all(abs(each.joint_vel[0]) < STANDS_RAD_S for each in watch(link, LEFT, 0.3))
-                arm(link, switch)
-                drive(link, LEFT, lambda: is_turning(link))
+                begin_to_turn(link, switch)
 
 
 @pytest.mark.parametrize("jump_s", [3600.0, -3600.0])
@@ -188,8 +185,7 @@ def test_a_clock_of_the_host_that_jumps_back_stops_it_as_a_late_command_does_and
 
     with emulated() as served, linked(served, switch, clock_us=clock_us) as link:
         machine = served.site._env.world.machine
-        arm(link, switch)
-        drive(link, LEFT, lambda: is_turning(link))
+        begin_to_turn(link, switch)
         jumped_us[0] = round(jump_s * 1e6)
         if jump_s < 0.0:
             drive(link, LEFT, lambda: abs(machine.joint_vel[0]) < STANDS_RAD_S)

@@ -5,15 +5,13 @@ from pathlib import Path
 
 from lerobot.cameras import CameraConfig
 
+from lerobot_excav.cameras.limits import MOST_FPS, MOST_PX
 from lerobot_excav.envs.masks.source import chooses_target, mask_source_names
 from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, setting
 
 ANY_FPS = 30
 """Rate that is told [1/s] (kind: guess): LeRobot's robots demand one of every camera, and a mask is read at any."""
-
-MOST_PX = 8192
-"""Greatest side of a picture [px] (kind: guess)."""
 
 
 @CameraConfig.register_subclass("mask")
@@ -43,7 +41,7 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
     )
     width: int = setting("Width of the shared camera's pictures [px]", low=1, high=MOST_PX)
     height: int = setting("Height of the shared camera's pictures [px]", low=1, high=MOST_PX)
-    fps: int = setting("Rate that robots are told [1/s]; a mask is read at any", default=ANY_FPS, low=1, high=1000)
+    fps: int = setting("Rate that robots are told [1/s]; a mask is read at any", default=ANY_FPS, low=1, high=MOST_FPS)
 
     def __post_init__(self) -> None:
         check_settings(self, "mask camera: ")

@@ -23,7 +23,7 @@ class _Told(NamedTuple):
     """What a mask camera was told."""
 
     words: str | None
-    options: bytes | None
+    options: str | None
 
 
 class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped here
@@ -72,7 +72,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         """
         if not self._is_connected:
             raise DeviceError(f"the mask camera of {self.config.of!r} is not connected; call connect() first")
-        told = _Told(words=self._read_command(), options=self._read_options())
+        told = self._read_told()
         if self._mask is None or told != self._made_for:
             self._mask = self._make(told.words)
             self._made_for = told
@@ -88,25 +88,10 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         """Return the mask, as `read`."""
         return self.read()
 
-    def _read_command(self) -> str | None:
-        if self.config.command is None:
-            return self.config.text
-        try:
-            return self.config.command.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigurationError(
-                f"command={self.config.command} of the mask camera cannot be read ({error}); write the target into it"
-            ) from error
-
-    def _read_options(self) -> bytes | None:
-        if self.config.options is None:
-            return None
-        try:
-            return Path(self.config.options).read_bytes()
-        except OSError as error:
-            raise ConfigurationError(
-                f"options={self.config.options} of the mask camera cannot be read ({error}); write the target into it"
-            ) from error
+    def _read_told(self) -> _Told:
+        config = self.config
+        words = config.text if config.command is None else _read("command", config.command).strip()
+        return _Told(words, None if config.options is None else _read("options", Path(config.options)))
 
     def _make(self, told: str | None) -> NDArray[np.uint8]:
         config = self.config
@@ -132,3 +117,17 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
                 f"{told or config.options!r}, so a policy had no target; say it otherwise, or move the camera"
             )
         return mask.img
+
+
+def _read(field: str, path: Path) -> str:
+    """Return the text of a file that says what to look for.
+
+    Raises:
+        ConfigurationError: It cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"{field}={path} of the mask camera cannot be read ({error}); write the target into it"
+        ) from error

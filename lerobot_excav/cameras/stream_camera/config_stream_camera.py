@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 from lerobot.cameras import CameraConfig
 
+from lerobot_excav.cameras.limits import MOST_FPS, MOST_PX
 from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, setting
 from lerobot_excav.testbed.picture_stream import LONGEST_NAME
-
-MOST_PX = 8192
-"""Greatest side of a picture [px] (kind: guess)."""
 
 
 @CameraConfig.register_subclass("stream")
@@ -28,7 +26,7 @@ class StreamCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's class
     host: str = setting("Address of the machine", default="127.0.0.1")
     width: int = setting("Width of its pictures [px]", low=1, high=MOST_PX)
     height: int = setting("Height of its pictures [px]", low=1, high=MOST_PX)
-    fps: int = setting("Pictures a second", low=1, high=1000)
+    fps: int = setting("Pictures a second", low=1, high=MOST_FPS)
     timeout_s: float = setting(
         "How long to wait for the first picture, and for the next one [s]", default=5.0, above=0.0, high=600.0
     )

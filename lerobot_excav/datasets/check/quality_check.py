@@ -18,7 +18,7 @@ from lerobot_excav.datasets.check.episode_check import (
 from lerobot_excav.datasets.check.numbering_check import numbering_problems
 from lerobot_excav.datasets.check.picture_check import picture_problems
 from lerobot_excav.datasets.check.quality_report import Findings, QualityReport
-from lerobot_excav.datasets.check.readability import layout_problems, opening_problem
+from lerobot_excav.datasets.check.readability import check_opening, layout_problems
 from lerobot_excav.datasets.check.replay_check import replay_problem
 from lerobot_excav.datasets.check.statistics_check import VECTOR_KEYS, SeenValues, statistics_problems
 from lerobot_excav.datasets.check.testbed_check import check_testbed_recording, is_testbed_recording
@@ -84,8 +84,6 @@ def check_dataset(
     if info is None:
         return findings.report()
     _require_known(episodes, info)
-    if is_testbed_recording(info):
-        return check_testbed_recording(root, info, episodes)
     dataset = _Dataset(
         root=root,
         info=info,
@@ -93,6 +91,9 @@ def check_dataset(
         tasks=findings.attempt(read_tasks, root, info),
         statistics=findings.attempt(read_statistics, root),
     )
+    if is_testbed_recording(info):
+        check_testbed_recording(root, info, dataset.metadata or [], findings, episodes)
+        return findings.report(has_pairs=False)
     if findings.attempt(_require_columns, info):
         _check_contents(dataset, findings, episodes, show_progress=show_progress)
         _check_replays(dataset, findings, replays, seed, show_progress=show_progress)
@@ -150,16 +151,7 @@ def _check_contents(
     if dataset.statistics is not None:
         is_whole = len(findings.lengths) == info.total_episodes
         findings.dataset += statistics_problems(dataset.statistics, info, seen if is_whole else None)
-    _check_opening(dataset, findings)
-
-
-def _check_opening(dataset: _Dataset, findings: Findings) -> None:
-    """Let LeRobot open what is sound."""
-    lengths = {index: findings.lengths[index] for index in findings.sound()}
-    if lengths and not findings.dataset:
-        is_whole = len(lengths) == dataset.info.total_episodes
-        if problem := opening_problem(dataset.root, dataset.info, lengths, is_whole=is_whole):
-            findings.dataset.append(problem)
+    check_opening(root, info, findings)
 
 
 def _check_episode(dataset: _Dataset, rows: EpisodeRows, findings: Findings) -> EpisodeTable | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
+from lerobot_excav.datasets.check.quality_report import Findings
 from lerobot_excav.datasets.format.dataset_info import INFO_PATH, PICTURE_DTYPES, DatasetInfo
 from lerobot_excav.datasets.format.frame_files import frame_files
 from lerobot_excav.datasets.format.metadata import EpisodeMetadata, missing_files
@@ -46,6 +47,15 @@ def _setting_problems(info: DatasetInfo) -> Iterator[str]:
             info.spec.make_settings(fps=info.fps, observation_height=height, observation_width=width)
         except ConfigurationError as error:
             yield f"{INFO_PATH}: {error}"
+
+
+def check_opening(root: Path, info: DatasetInfo, findings: Findings) -> None:
+    """Let LeRobot open what is sound, unless something is wrong with the whole dataset."""
+    lengths = {index: findings.lengths[index] for index in findings.sound()}
+    if lengths and not findings.dataset:
+        is_whole = len(lengths) == info.total_episodes
+        if problem := opening_problem(root, info, lengths, is_whole=is_whole):
+            findings.dataset.append(problem)
 
 
 def opening_problem(root: Path, info: DatasetInfo, lengths: Mapping[int, int], *, is_whole: bool) -> str:

@@ -1,6 +1,6 @@
 """Check of a recording of a real machine: it has no scene that could be shown again, but it says when it was late."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +8,8 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.check.episode_check import ACTION_MARGIN
-from lerobot_excav.datasets.check.quality_report import Findings, QualityReport
-from lerobot_excav.datasets.check.readability import opening_problem
+from lerobot_excav.datasets.check.quality_report import Findings
+from lerobot_excav.datasets.check.readability import check_opening
 from lerobot_excav.datasets.format.alignment_columns import (
     ALIGNMENT_COLUMNS,
     IMAGE_AGE_KEY,
@@ -19,7 +19,7 @@ from lerobot_excav.datasets.format.alignment_columns import (
 )
 from lerobot_excav.datasets.format.dataset_info import DatasetInfo
 from lerobot_excav.datasets.format.frame_files import EpisodeRows, iterate_rows
-from lerobot_excav.datasets.format.metadata import missing_files, read_episode_metadata, read_statistics, read_tasks
+from lerobot_excav.datasets.format.metadata import EpisodeMetadata, missing_files
 from lerobot_excav.datasets.format.schema import ACTION_KEY, MASK_KEY, PAIR_KEY, STATE_KEY
 
 _READ = (ACTION_KEY, STATE_KEY, *ALIGNMENT_COLUMNS)
@@ -30,7 +30,13 @@ def is_testbed_recording(info: DatasetInfo) -> bool:
     return set(ALIGNMENT_COLUMNS) <= set(info.features) and PAIR_KEY not in info.features
 
 
-def check_testbed_recording(root: Path, info: DatasetInfo, episodes: Collection[int] | None = None) -> QualityReport:
+def check_testbed_recording(
+    root: Path,
+    info: DatasetInfo,
+    metadata: Sequence[EpisodeMetadata],
+    findings: Findings,
+    episodes: Collection[int] | None = None,
+) -> None:
     """Check numbers, ages and masks of a recording that `lerobot-excav alignment` has completed.
 
     Frames whose pictures or state were too old, and those in which the machine did something else than the action says,
@@ -39,32 +45,21 @@ def check_testbed_recording(root: Path, info: DatasetInfo, episodes: Collection[
     Args:
         root: The recording.
         info: What it says about itself.
+        metadata: What it says of its episodes, as far as that can be read.
+        findings: What was found before; what is found is added.
         episodes: Episodes to check; all by default.
     """
-    findings = Findings()
     missing = [key for key in _READ if key not in info.features]
     if missing:
         findings.dataset.append(f"the column {missing[0]} is missing")
-        return findings.report(has_pairs=False)
-    metadata = findings.attempt(read_episode_metadata, root, info)
-    findings.attempt(read_tasks, root, info)
-    findings.attempt(read_statistics, root)
-    findings.dataset += findings.attempt(lambda: list(missing_files(root, info, metadata or []))) or []
+        return
+    findings.dataset += findings.attempt(lambda: list(missing_files(root, info, metadata))) or []
     for rows in iterate_rows(root, info, _READ, episodes=episodes, report=findings.note):
         findings.episodes[rows.index] = list(rows.problems) or list(_problems(rows))
         findings.lengths[rows.index] = rows.table.num_rows
-    if not findings.dataset:
-        _check_opening(root, info, findings)
+    check_opening(root, info, findings)
     if MASK_KEY in info.features and not findings.dataset:
         _check_masks(root, findings)
-    return findings.report(has_pairs=False)
-
-
-def _check_opening(root: Path, info: DatasetInfo, findings: Findings) -> None:
-    """Let LeRobot open what is sound."""
-    lengths = {index: findings.lengths[index] for index in findings.sound()}
-    if lengths and (problem := opening_problem(root, info, lengths, is_whole=len(lengths) == info.total_episodes)):
-        findings.dataset.append(problem)
 
 
 def _problems(rows: EpisodeRows) -> Iterator[str]:

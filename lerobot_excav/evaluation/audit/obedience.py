@@ -48,13 +48,14 @@ def obedience(branches: Sequence[Branch], operator: Sequence[Branch], rng: np.ra
         rng: Generator of the bootstrap.
     """
     by_scene = _acted_by_scene(branches)
+    compared = [scene for scene in by_scene.values() if len(scene) > 1]
     return Obedience(
         scenes=len({branch.scene_id for branch in branches}),
-        compared_scenes=sum(len(scene) > 1 for scene in by_scene.values()),
+        compared_scenes=len(compared),
         branches=len(branches),
         acted=wilson_interval(sum(branch.acted_w is not None for branch in branches), len(branches)),
         success=wilson_interval(sum(branch.is_success for branch in branches), len(branches)),
-        slope=_slope(list(by_scene.values()), rng),
+        slope=_slope(compared, rng),
         entry_error_m=_mean([float(np.mean([entry_error_m(b) for b in scene])) for scene in by_scene.values()], rng),
         share=_mean(list(_shares(by_scene).values()), rng),
         relative_share=_relative_share(_shares(by_scene), _shares(_acted_by_scene(operator)), rng),
@@ -84,7 +85,7 @@ def _acted_by_scene(branches: Sequence[Branch]) -> dict[int, list[Branch]]:
 
 def _slope(scenes: Sequence[Sequence[Branch]], rng: np.random.Generator) -> Interval | None:
     """Regress through the origin: sum of products over sum of squares, both by scene for the bootstrap."""
-    sums = [(np.sum(told * did), np.sum(told * told)) for told, did in map(deviations_m, scenes) if len(told) > 1]
+    sums = [(np.sum(told * did), np.sum(told * told)) for told, did in map(deviations_m, scenes)]
     if not sums:
         return None
     products, squares = np.array(sums).T

@@ -175,7 +175,7 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         changed = self._watch.changed(mask)
         if not self.config.backtrack_frames:
             return self._planned(batch, changed)
-        arrived = self._way_back.look(mask).to(changed.device)
+        arrived = self._way_back.look(mask, changed).to(changed.device)
         changed = (changed & ~self._way_back.is_leading.to(changed.device)) | arrived
         return self._way_back.led(self._planned(batch, changed))
 

@@ -33,25 +33,27 @@ class WayBack:
         self._led: list[deque[Tensor]] = []
         self._has_arrived: list[bool] = []
         self._still_frames: list[int] = []
-        self._mask: Tensor | None = None  # of the way
-        self._last: Tensor | None = None  # of the frame before
+        self._mask: Tensor | None = None
 
     @property
     def is_leading(self) -> Tensor:
         """Which environments are on their way back, bool (B,); meanwhile their masks are not looked at."""
         return torch.tensor([bool(led) for led in self._led], dtype=torch.bool)
 
-    def look(self, mask: Tensor) -> Tensor:
+    def look(self, mask: Tensor, changed: Tensor) -> Tensor:
         """Begin the way back where a mask, (B, 1, H, W), shows another target.
+
+        Args:
+            mask: Those of this frame.
+            changed: Which of them are others than in the frame before, bool (B,).
 
         Returns:
             Which environments have come to the end of their way back, and need a plan from there, bool (B,).
         """
-        if self._mask is None or self._last is None:
-            self._mask, self._last = mask.clone(), mask.clone()
+        if self._mask is None:
+            self._mask, changed = mask.clone(), torch.zeros_like(changed)  # the first ones are no change
             self._ways, self._led = [[] for _ in mask], [deque() for _ in mask]
             self._has_arrived, self._still_frames = [False for _ in mask], [0 for _ in mask]
-        is_still, self._last = (self._last == mask).flatten(1).all(dim=1), mask.clone()
         shown = mask.flatten(1).any(dim=1)
         is_other = shown & self._mask.flatten(1).any(dim=1) & ~((self._mask > 0) & (mask > 0)).flatten(1).any(dim=1)
         for number, way in enumerate(self._ways):
@@ -62,8 +64,8 @@ class WayBack:
                 if len(way) <= self._most_frames and self._still_frames[number] >= STILL_FRAMES:
                     self._led[number] = deque(way[:: self._stride][::-1])
                 self._ways[number] = []
-        counts = zip(self._still_frames, is_still.tolist(), strict=True)
-        self._still_frames = [count + 1 if still else 0 for count, still in counts]
+        counts = zip(self._still_frames, changed.tolist(), strict=True)
+        self._still_frames = [0 if is_new else count + 1 for count, is_new in counts]
         arrived, self._has_arrived = torch.tensor(self._has_arrived), [False for _ in self._has_arrived]
         return arrived
 

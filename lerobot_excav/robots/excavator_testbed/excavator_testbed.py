@@ -21,7 +21,7 @@ from lerobot_excav.robots.session_log import default_path
 from lerobot_excav.robots.simulated_robot import command_from_action
 from lerobot_excav.testbed.dead_man import AlwaysHeld, DeadMan, GamepadButton
 from lerobot_excav.testbed.host_link import Heard, HostLink
-from lerobot_excav.testbed.protocol import RATE_HZ, REFUSAL_WORDS, Refusal, StateFlag
+from lerobot_excav.testbed.protocol import DIVIDING_RATES, REFUSAL_WORDS, Refusal, StateFlag
 from lerobot_excav.testbed.safety import STALE_S, STILL
 
 logger = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 # Until a machine is ready it has to see centred sticks, whatever a policy wants.
 NOT_READY = (Refusal.EMERGENCY_STOP, Refusal.NOT_HEARD, Refusal.SOAK, Refusal.START_GATE)
 
-FRAME_RATES = tuple(rate for rate in range(1, RATE_HZ + 1) if RATE_HZ % rate == 0 and rate * STALE_S > 1.0)
+FRAME_RATES = tuple(rate for rate in DIVIDING_RATES if rate * STALE_S > 1.0)
 """Frames a second that a loop may have: they divide the rate of datagrams, so that every action is sent equally often,
 and a frame is shorter than a command counts."""
 

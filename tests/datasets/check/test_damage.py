@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from lerobot_excav.datasets.check import quality_check
+from lerobot_excav.datasets.check import quality_check, readability
 from lerobot_excav.scripts.main import main
 
 from ..damage import HARMFUL, HARMLESS, SEEN_BY_LEROBOT_ALONE, VIDEOS
@@ -27,7 +27,7 @@ def copy(small_datasets, tmp_path):
 )
 def test_damage_is_a_verdict_that_names_it_and_no_index_hides_it(copy, capsys, monkeypatch, storage, name):
     # To open what is left takes most of the time, and it is not what is looked at.
-    monkeypatch.setattr(quality_check, "opening_problem", lambda *_, **__: "")
+    monkeypatch.setattr(readability, "opening_problem", lambda *_, **__: "")
     root, damage = copy(storage), ALL_HARMFUL[storage][name]
     damage.apply(root)
     assert main(["qc", str(root), "--replays=0"]) == 1
@@ -38,7 +38,7 @@ def test_damage_is_a_verdict_that_names_it_and_no_index_hides_it(copy, capsys, m
 
 
 def test_a_dataset_that_may_not_be_written_to_is_judged_all_the_same(copy, capsys, monkeypatch):
-    monkeypatch.setattr(quality_check, "opening_problem", lambda *_, **__: "")
+    monkeypatch.setattr(readability, "opening_problem", lambda *_, **__: "")
     root = copy()
     (root / "meta/excav_pairs.parquet").unlink()
     (root / "meta/excav_pairs.parquet").mkdir()

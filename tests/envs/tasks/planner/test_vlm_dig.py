@@ -249,24 +249,24 @@ def test_the_real_sam2_bounds_the_region_that_a_model_has_chosen(tmp_path, liked
     env.close()
 
 
+def answers_of(folder, *, most_tokens, times=1):
+    """Ask the model of a folder about two black pictures."""
+    placement = Placement(download=False, device="cpu")
+    model = VisionLanguageModel(ModelName(name=str(folder)), placement, most_tokens=most_tokens)
+    picture = np.zeros((96, 128, 3), np.uint8)
+    return [model.ask([picture, picture], "Where to dig?") for _ in range(times)]
+
+
 @needs_transformers
 def test_places_of_a_qwen3_are_thousandths_of_the_picture(tmp_path):
     tiny_models.save_qwen3(tmp_path / "qwen3")
-    model = VisionLanguageModel(
-        ModelName(name=str(tmp_path / "qwen3")), Placement(download=False, device="cpu"), most_tokens=4
-    )
-    picture = np.zeros((96, 128, 3), np.uint8)
-    assert model.ask([picture, picture], "Where to dig?").scale == (1000.0, 1000.0)
+    (answer,) = answers_of(tmp_path / "qwen3", most_tokens=4)
+    assert answer.scale == (1000.0, 1000.0)
 
 
 @needs_transformers
 def test_the_real_classes_answer_about_two_pictures(tmp_path):
     tiny_models.save_qwen(tmp_path / "qwen")
-    model = VisionLanguageModel(
-        ModelName(name=str(tmp_path / "qwen")), Placement(download=False, device="cpu"), most_tokens=16
-    )
-    picture = np.zeros((96, 128, 3), np.uint8)
-    answer = model.ask([picture, picture], "Where to dig?")
+    answer, again = answers_of(tmp_path / "qwen", most_tokens=16, times=2)
     assert answer.scale == (84.0, 140.0)  # multiples of 28 pixels
-    again = model.ask([picture, picture], "Where to dig?")
     assert again == answer
