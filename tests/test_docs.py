@@ -36,6 +36,7 @@ INVENTED = {
     "--policy.mask_strength=2": None,
 }
 INVENTED_FILES = {
+    "main.toml",
     "lerobot_env_redness.py",
     "sam.toml",
     "vlm.toml",

@@ -9,6 +9,8 @@ Examples:
       a machine at 127.0.0.1:47500, its cameras at port 47501
   lerobot-excav testbed-emulator --delay_ms=40 --loss=0.05 --metrics=outputs/testbed.jsonl
       ... behind a bad wire
+  lerobot-excav testbed-emulator --calibration=outputs/main.toml
+      ... with a depth camera, at which mask sources may look
 """
 
 import signal
@@ -26,6 +28,7 @@ from lerobot_excav.setting import setting
 from lerobot_excav.testbed.address import USUAL_PORT
 from lerobot_excav.testbed.protocol import DIVIDING_RATES, RATE_HZ
 from lerobot_excav.testbed.safety import SOAK_S
+from lerobot_excav.whole_file import write_whole
 
 
 @dataclass(kw_only=True)
@@ -54,6 +57,10 @@ class TestbedEmulatorArguments(Arguments):
     duplicates: float = setting("Share of the datagrams that come twice", default=0.0, low=0.0, high=1.0)
     seed: int = setting("Seed of noise and faults", default=0, low=0, high=2**63 - 1)
     metrics: Path | None = setting("JSON Lines file of what came of every cycle", default=None)
+    calibration: Path | None = setting(
+        "Offer the depth of main as well, and write to this TOML file where main stands, for a mask camera",
+        default=None,
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,6 +80,7 @@ class TestbedEmulatorArguments(Arguments):
 
 def run(arguments: TestbedEmulatorArguments) -> int:
     """Serve until it is interrupted."""
+    from lerobot_excav.cameras.mask_camera.calibration import calibration_text
     from lerobot_excav.testbed.emulated_site import EmulatedSite
     from lerobot_excav.testbed.emulator import EmulatedMachine
     from lerobot_excav.testbed.faulty_wire import WireFaults
@@ -96,8 +104,12 @@ def run(arguments: TestbedEmulatorArguments) -> int:
         first_scene=arguments.first_scene,
         host=arguments.host,
         ports=(arguments.port, arguments.picture_port),
+        has_depth=arguments.calibration is not None,
         on_over=lambda metrics: _tell(metrics, arguments.metrics),
     )
+    if arguments.calibration is not None:
+        arguments.calibration.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(arguments.calibration, calibration_text(site.camera))
     emulator = site.emulator
     print(f"the machine: {emulator.address[0]}:{emulator.address[1]}", flush=True)
     print(f"its cameras: {emulator.picture_address[0]}:{emulator.picture_address[1]}", flush=True)

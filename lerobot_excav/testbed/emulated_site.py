@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.registry import task_of_settings
@@ -15,9 +16,13 @@ from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.shown_source import shown_source
 from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
+from lerobot_excav.testbed.picture_stream import depth_name
 from lerobot_excav.testbed.protocol import RATE_HZ
 
 MASK = "target_mask"
+
+FARTHEST_MM = 20_000
+"""How far the emulated depth camera sees [mm] (kind: guess, of stereo cameras for outdoors)."""
 
 
 class EmulatedSite:
@@ -31,6 +36,7 @@ class EmulatedSite:
         first_scene: Number of the first scene.
         host: Address to listen at.
         ports: Of datagrams and pictures; 0 takes a free one.
+        has_depth: Whether it has the depth of its camera `main` as well.
         on_over: Told the metrics of every cycle.
 
     Attributes:
@@ -45,6 +51,7 @@ class EmulatedSite:
         first_scene: int = 0,
         host: str = "127.0.0.1",
         ports: tuple[int, int] = (0, 0),
+        has_depth: bool = False,
         on_over: Callable[[dict[str, Any]], None] = lambda metrics: None,
     ) -> None:
         settings.require_commanded_mask()
@@ -58,6 +65,7 @@ class EmulatedSite:
         self._masked: Command | None = None
         self._mask: TargetMask | None = None
         self._black: NDArray[np.uint8] = np.zeros((*settings.observation_size, 3), np.uint8)
+        self._has_depth = has_depth
         self._start, self._tell = first_scene * self._spec.starts_per_scene, on_over
         self._show()
         self.emulator = Emulator(
@@ -70,11 +78,23 @@ class EmulatedSite:
             on_over=self._go_on,
         )
 
-    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+    @property
+    def camera(self) -> PinholeCamera:
+        """Where its camera `main` stands, and how it projects."""
+        camera: PinholeCamera = self._env.camera
+        return camera
+
+    def pictures(self) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
         """Return what the cameras show now, by name; the mask is made once for a command, black if nothing is found."""
         shown = {name: self._env.renderer.render(name) for name in self._spec.cameras if name not in ("main", MASK)}
         self._look()
-        return {"main": self._env.picture(), **shown, MASK: self._mask_img()}
+        depth = {depth_name("main"): self._depth_mm()} if self._has_depth else {}
+        return {"main": self._env.picture(), **shown, **depth, MASK: self._mask_img()}
+
+    def _depth_mm(self) -> NDArray[np.uint16]:
+        """Return the depth of `main`, (H, W) [mm]; as of a depth camera, 0 for what is too far away."""
+        depth_mm = np.rint(1e3 * self._env.depth_m())
+        return np.where(depth_mm <= FARTHEST_MM, depth_mm, 0.0).astype(np.uint16)
 
     def _look(self) -> None:
         """Make the mask of a new command."""

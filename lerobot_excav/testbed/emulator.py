@@ -6,7 +6,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,7 +66,7 @@ class Emulator:
         host: Address to listen at.
         port: Port of the datagrams; 0 takes a free one.
         picture_port: Port of the pictures; 0 takes a free one.
-        pictures: Returns what its cameras show now, by name, (H, W, 3) uint8.
+        pictures: Returns what its cameras show now, by name, (H, W, 3) uint8, or (H, W) uint16 [mm] of depth.
         on_over: Told what came of an episode, as its metrics say it; whoever is told resets `env`.
 
     Attributes:
@@ -88,7 +88,7 @@ class Emulator:
         host: str = "127.0.0.1",
         port: int = 0,
         picture_port: int = 0,
-        pictures: Callable[[], dict[str, NDArray[np.uint8]]],
+        pictures: Callable[[], Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]],
         on_over: Callable[[dict[str, Any]], None],
     ) -> None:
         self._env, self._machine, self._draw, self._on_over = env, machine, pictures, on_over
@@ -202,7 +202,8 @@ class Emulator:
     def _show(self) -> None:
         taken_us = self.clock_us
         for name, picture in self._draw().items():
-            self._pictures.show(name, taken_us, picture, lossless=name == "target_mask")
+            is_depth = picture.dtype == np.uint16
+            self._pictures.show(name, taken_us, picture, lossless=is_depth or name == "target_mask")
 
     def _answer(self, now_s: float) -> None:
         self._number += 1

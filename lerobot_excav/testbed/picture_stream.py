@@ -2,7 +2,8 @@
 
 A client connects by TCP and sends the camera's name and a line feed. Then pictures come as long as it listens, each as
 12 bytes (uint64 clock of the machine at its exposure [us], uint32 size, little-endian) and a JPEG or PNG file. Who is
-slow misses pictures; none is queued.
+slow misses pictures; none is queued. The depth of a camera, registered with its pictures, comes under a name of its own
+as PNG files of 16-bit grey [mm], 0 where nothing was measured.
 """
 
 import contextlib
@@ -30,11 +31,19 @@ _LOOK_EVERY_S = 1.0  # whether a client that waits is still there
 
 
 class Picture(NamedTuple):
-    """A picture (H, W, 3) uint8, the machine's clock at its exposure [us], and when it came [s]."""
+    """A picture, the machine's clock at its exposure [us], and when it came [s].
+
+    `pixels` are (H, W, 3) uint8, or (H, W, 1) uint16 [mm] of depth.
+    """
 
     taken_us: int
     came_s: float
-    pixels: NDArray[np.uint8]
+    pixels: NDArray[np.uint8] | NDArray[np.uint16]
+
+
+def depth_name(name: str) -> str:
+    """Return under which name the depth of a camera comes."""
+    return f"{name}_depth"
 
 
 class PictureServer:
@@ -59,8 +68,13 @@ class PictureServer:
         self._is_over = False
         threading.Thread(target=self._serve, name="pictures", daemon=True).start()
 
-    def show(self, name: str, taken_us: int, picture: NDArray[np.uint8], *, lossless: bool = False) -> None:
-        """Make a picture (H, W, 3) the newest one of a camera; `lossless` keeps every pixel."""
+    def show(
+        self, name: str, taken_us: int, picture: NDArray[np.uint8] | NDArray[np.uint16], *, lossless: bool = False
+    ) -> None:
+        """Make a picture (H, W, 3) the newest one of a camera.
+
+        `lossless` keeps every pixel; depth, (H, W) uint16 [mm], needs it.
+        """
         file = io.BytesIO()
         image = Image.fromarray(picture)
         image.save(file, "PNG", compress_level=1) if lossless else image.save(file, "JPEG", quality=95)
@@ -145,9 +159,10 @@ class PictureClient:
         except OSError as error:
             self.close()
             raise DeviceError(f"the picture stream at {where} cannot be reached: {error}") from error
+        seen = self._count
         threading.Thread(target=self._listen, args=(self._socket,), name=self._name, daemon=True).start()
         try:
-            self.next(timeout_s)
+            self._after(seen, timeout_s)
         except DeviceError as error:
             self.close()
             raise DeviceError(
@@ -179,8 +194,11 @@ class PictureClient:
         Raises:
             DeviceError: None comes in time.
         """
+        return self._after(self._count, timeout_s)
+
+    def _after(self, seen: int, timeout_s: float) -> Picture:
+        """Wait for a picture that is not among the first `seen`."""
         with self._change:
-            seen = self._count
             if not self._change.wait_for(lambda: self._count > seen or self._socket is None, timeout_s):
                 raise DeviceError(f"no picture of {self._name!r} came within {timeout_s:.2f} s; is the machine on?")
             if self._newest is None:
@@ -194,7 +212,7 @@ class PictureClient:
                 taken_us, size = _HEADER.unpack(_exactly(file, _HEADER.size))
                 if size > _MOST_BYTES:
                     raise ValueError(f"a picture of {size} bytes")
-                pixels = np.asarray(Image.open(io.BytesIO(_exactly(file, size))).convert("RGB"))
+                pixels = _pixels(_exactly(file, size))
                 with self._change:
                     self._newest = Picture(taken_us, self._clock_s(), pixels)
                     self._count += 1
@@ -210,6 +228,14 @@ def is_gone(client: socket.socket) -> bool:
     """Tell whether a client, which has nothing more to say, has closed its connection."""
     ready, _, _ = select.select([client], [], [], 0.0)
     return bool(ready) and not client.recv(1, socket.MSG_PEEK)
+
+
+def _pixels(data: bytes) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Return the pixels of a file: (H, W, 1) uint16 of 16-bit grey, (H, W, 3) uint8 of anything else."""
+    image = Image.open(io.BytesIO(data))
+    if image.mode.startswith("I"):
+        return np.asarray(image).astype(np.uint16)[..., None]
+    return np.asarray(image.convert("RGB"))
 
 
 def _exactly(file: io.BufferedReader, size: int) -> bytes:

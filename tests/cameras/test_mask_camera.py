@@ -183,7 +183,7 @@ def test_a_mask_is_snapped_if_the_camera_says_so(connected, tmp_path, monkeypatc
     ("mask", "words"),
     [
         ("source: crystal_ball", "crystal_ball"),
-        ("source: vlm_dig", "chooses where to act"),
+        ("source: vlm_dig", "give targets: regions"),
         ("source: colour_of_words, text: red, command: c.txt", "give one of them"),
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import logging
 import sys
+from contextlib import closing
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -16,7 +17,9 @@ from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_teleoperate
 from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers the types
+from lerobot_excav.cameras.mask_camera.calibration import calibration_text
 from lerobot_excav.envs.machines.excavator.features import ACTION_NAMES
+from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.robots.excavator_testbed.config_excavator_testbed import ExcavatorTestbedConfig
 from lerobot_excav.robots.recording_command import require_command_for_machine
@@ -220,3 +223,28 @@ def test_a_robot_is_not_even_made_for_a_command_of_another_rate(tmp_path):
     config = draccus.parse(lerobot_teleoperate.TeleoperateConfig, args=[*robot, *teleop])  # LeRobot's own 60
     with pytest.raises(ValueError, match=r"takes 10, 25, 50 actions a second: it sends 60\..*Give --fps=50$"):
         make_robot_from_config(config.robot)
+
+
+@pytest.mark.slow
+def test_depth_is_recorded_beside_the_pictures_and_the_planner_points_by_it(run, tmp_path):
+    calibration = tmp_path / "main.toml"
+    with closing(ExcavatorEnv(scene_set="train", fidelity="fast", render_mode=None, **SIZE)) as env:
+        env.reset(options={"scene_id": 0, "target_id": 0})
+        depth_m = env.depth_m()
+    teleop = ["--teleop.type=leftward", f"--teleop.calibration_dir={tmp_path}", "--play_sounds=false"]
+    with emulated(SIZE, has_depth=True) as served:
+        calibration.write_text(calibration_text(served.site.camera))
+        size = "width: 128, height: 96"
+        port = served.emulator.picture_address[1]
+        stream = f"{{type: stream, port: {port}, name: main, fps: 10, use_depth: true, {size}}}"
+        mask = f"{{type: mask, of: main, source: geometry, targets: regions, calibration: {calibration}, {size}}}"
+        cameras = f"{{main: {{type: shared, name: main, camera: {stream}}}, target_mask: {mask}}}"
+        run(lerobot_record.main, served, *teleop, *data_flags(tmp_path / "data"), cameras=cameras)
+    dataset = LeRobotDataset("someone/driven", root=tmp_path / "data")
+    assert dataset.meta.features["observation.images.main_depth"]["info"]["is_depth_map"]
+    recorded = np.asarray(dataset[0]["observation.images.main_depth"], float).squeeze()
+    near = depth_m < 15.0
+    assert np.median(np.abs(recorded - 1e3 * depth_m)[near]) < 5.0  # [mm]
+    marked = dataset[3]["observation.images.target_mask"].numpy()
+    assert set(np.unique(marked)) == {0.0, 1.0}
+    assert 0.001 < marked.mean() < 0.05

@@ -24,7 +24,7 @@ def until(condition, limit_s=20.0):
 
 
 @contextmanager
-def emulated(settings=None, port=0, **machine):
+def emulated(settings=None, port=0, *, has_depth=False, **machine):
     """Run a machine without soak; its metrics are collected in `cycles`."""
     cycles, over = [], threading.Event()
     machine = {"soak_s": 0.0, "valves": Valves(lag_s=0.05), "pictures_hz": 10, **machine}
@@ -32,6 +32,7 @@ def emulated(settings=None, port=0, **machine):
         ExcavatorSettings(**{**SMALL, "scene_set": "train", **(settings or {})}),
         EmulatedMachine(**machine),
         ports=(port, 0),
+        has_depth=has_depth,
         on_over=cycles.append,
     )
     thread = threading.Thread(target=site.emulator.run, args=(over.is_set,), daemon=True)

@@ -7,6 +7,7 @@ from lerobot.cameras import CameraConfig
 
 from lerobot_excav.cameras.limits import MOST_FPS, MOST_PX
 from lerobot_excav.envs.masks.source import chooses_target, mask_source_names
+from lerobot_excav.envs.tasks.planner.zones import Zone, parsed_zones, zone_text
 from lerobot_excav.errors import require
 from lerobot_excav.setting import check_settings, setting
 
@@ -25,7 +26,8 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
 
     of: str = setting("Name of the shared camera at whose pictures the source looks")
     source: str = setting(
-        "What makes the mask: click, manual, grounded_sam, or a source of another package that needs a picture only",
+        "What makes the mask: click, manual, grounded_sam, or a source of another package that needs a picture only; "
+        "for regions of the ground also geometry and vlm_dig",
         choices=mask_source_names,
     )
     options: str | None = setting(
@@ -33,11 +35,25 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
     )
     text: str | None = setting("What to look for, before what the options say", default=None)
     command: Path | None = setting(
-        "Text file that holds what to look for; whenever it changes, the mask is made again", default=None
+        "Text file that holds what to look for; whenever it changes, the mask is made again, also by a source that "
+        "does not read it",
+        default=None,
     )
     snap: bool = setting(
         "Whether a small network marks the object under the middle of the mask, and that is taken in its place",
         default=False,
+    )
+    calibration: Path | None = setting(
+        "TOML file of where the shared camera stands; its depth is looked at then", default=None
+    )
+    targets: str = setting(
+        "What is acted on: objects, or regions of the ground that the excavator digs and that its planner may choose",
+        default="objects",
+        choices=("objects", "regions"),
+    )
+    keep_out: str = setting(
+        "Rectangles of the ground in which nothing is dug, x_low,y_low,x_high,y_high [m], parted by semicolons",
+        default="none",
     )
     width: int = setting("Width of the shared camera's pictures [px]", low=1, high=MOST_PX)
     height: int = setting("Height of the shared camera's pictures [px]", low=1, high=MOST_PX)
@@ -45,8 +61,24 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
 
     def __post_init__(self) -> None:
         check_settings(self, "mask camera: ")
-        require(not chooses_target(self.source), f"mask camera: source={self.source} chooses where to act by itself")
+        is_regions = self.targets == "regions"
+        require(
+            not is_regions or self.calibration is not None,
+            "mask camera: targets=regions needs calibration=FILE, and a shared camera that measures depth",
+        )
+        require(
+            is_regions or not chooses_target(self.source),
+            f"mask camera: source={self.source} chooses where to dig by itself; give targets: regions",
+        )
+        zones = parsed_zones("mask camera: keep_out", self.keep_out)
+        require(not zones or is_regions, f"mask camera: keep_out={self.keep_out!r} has no effect with targets=objects")
+        self.keep_out = zone_text(zones)
         require(
             self.text is None or self.command is None,
             "text and command of a mask camera both say what to look for; give one of them",
         )
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """The keep-out zones."""
+        return parsed_zones("keep_out", self.keep_out)

@@ -1,5 +1,6 @@
 """The mask camera itself."""
 
+import logging
 from pathlib import Path
 from typing import Any, NamedTuple, override
 
@@ -7,13 +8,18 @@ import numpy as np
 from lerobot.cameras import Camera
 from numpy.typing import NDArray
 
+from lerobot_excav.cameras.mask_camera.calibration import read_calibration
 from lerobot_excav.cameras.mask_camera.config_mask_camera import MaskCameraConfig
+from lerobot_excav.cameras.mask_camera.registered_depth import registered_depth_m
 from lerobot_excav.cameras.shared_camera.shared_camera import SharedCamera
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.picture_view import PictureView
 from lerobot_excav.envs.masks.snapped import SnappedMasks
-from lerobot_excav.envs.masks.source import MaskMissingError, make_mask_source
+from lerobot_excav.envs.masks.source import MaskMissingError, make_mask_source, reads_text
+from lerobot_excav.envs.tasks.scoop.pile_view import PileView
 from lerobot_excav.errors import ConfigurationError, DeviceError
+
+logger = logging.getLogger(__name__)
 
 KEY = "live"
 """By which a file of masks names what this camera sees."""
@@ -36,6 +42,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
     def __init__(self, config: MaskCameraConfig) -> None:
         super().__init__(config)
         self.config = config
+        self._calibration = None if config.calibration is None else read_calibration(config.calibration)
         self._is_connected = False
         self._made_for: _Told | None = None
         self._mask: NDArray[np.uint8] | None = None
@@ -65,7 +72,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         """Return the mask, (H, W, 3) uint8 of {0, 255}.
 
         Raises:
-            DeviceError: The camera or the shared one is not connected.
+            DeviceError: The camera or the shared one is not connected, or depth is needed and was not measured.
             MaskMissingError: The source finds nothing, so that a policy would act without a target.
             ConfigurationError: The file of the command or of the options cannot be read, or the shared camera has
                 another size.
@@ -107,16 +114,29 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
                 f"the shared camera {config.of!r} gives {picture.shape[:2]}, the mask camera was set up for "
                 f"{(config.height, config.width)} (height, width); give both the same size"
             )
-        source = make_mask_source(config.source, options=config.options, text=told)
+        text = told if config.command is None or reads_text(config.source) else None  # or the file only says when
+        source = make_mask_source(config.source, options=config.options, text=text)
         source = SnappedMasks(source) if config.snap else source
-        view = PictureView(picture, key=KEY, words=told or "")
-        mask = source.mask(view, Command(target_id=0, region=None))
+        mask = source.mask(self._view(shared, picture, told or ""), Command(target_id=0, region=None))
         if mask is None or not mask.pixels.any():
             raise MaskMissingError(
                 f"source={config.source!r} of the mask camera finds nothing in the picture of {config.of!r} for "
                 f"{told or config.options!r}, so a policy had no target; say it otherwise, or move the camera"
             )
+        if mask.parameters:
+            logger.info("mask of %r by %s: %s", config.of, mask.source, dict(mask.parameters))
         return mask.img
+
+    def _view(self, shared: SharedCamera, picture: NDArray[np.uint8], words: str) -> PictureView:
+        """Return what the source may look at."""
+        if self._calibration is None:
+            return PictureView(picture, key=KEY, words=words)
+        camera = self._calibration.camera(*picture.shape[:2])
+        depth_m = registered_depth_m(shared.read_latest_depth(), picture, shared.name)
+        if self.config.targets == "regions":
+            zones = self.config.zones
+            return PileView(picture, key=KEY, words=words, depth_m=depth_m, camera=camera, zones=zones)
+        return PictureView(picture, key=KEY, words=words, depth_m=depth_m, camera=camera)
 
 
 def _read(field: str, path: Path) -> str:

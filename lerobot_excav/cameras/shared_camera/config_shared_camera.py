@@ -26,6 +26,11 @@ class SharedCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's class
     name: str = setting("Name under which mask cameras know it, as `of`")
     camera: CameraConfig = setting("The camera itself, of any type of LeRobot")
 
+    @property
+    def use_depth(self) -> bool:
+        """Whether the camera measures depth as well, as LeRobot's robots ask it."""
+        return bool(getattr(self.camera, "use_depth", False))
+
     def __post_init__(self) -> None:
         check_settings(self, "shared camera: ")
         for field in ("fps", "width", "height"):

@@ -81,6 +81,23 @@ class SharedCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         """When it was taken, by the clock of the machine that sent it [us], if the camera tells it."""
         return getattr(self._camera, "taken_us", None)
 
+    @property
+    def use_depth(self) -> bool:
+        """Whether the camera measures depth as well."""
+        return bool(getattr(self._camera, "use_depth", False))
+
+    def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.uint16]:
+        """Return the newest depth image, (H, W, 1) [mm], 0 where nothing was measured.
+
+        Raises:
+            DeviceError: The camera measures none.
+        """
+        if not self.use_depth:
+            raise DeviceError(
+                f"the shared camera {self.name!r} measures no depth; give its camera use_depth: true, if it can"
+            )
+        return np.asarray(self._camera.read_latest_depth(max_age_ms), np.uint16)
+
     def last_picture(self) -> NDArray[np.uint8]:
         """Return the picture that was read last, or read one."""
         return self.read() if self._last is None else self._last

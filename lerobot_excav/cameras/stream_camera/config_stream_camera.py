@@ -27,6 +27,7 @@ class StreamCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's class
     width: int = setting("Width of its pictures [px]", low=1, high=MOST_PX)
     height: int = setting("Height of its pictures [px]", low=1, high=MOST_PX)
     fps: int = setting("Pictures a second", low=1, high=MOST_FPS)
+    use_depth: bool = setting("Whether its depth, which the machine calls <name>_depth, is read as well", default=False)
     timeout_s: float = setting(
         "How long to wait for the first picture, and for the next one [s]", default=5.0, above=0.0, high=600.0
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lerobot_excav.cameras.stream_camera.config_stream_camera import StreamCameraConfig
 from lerobot_excav.errors import ConfigurationError, DeviceError
-from lerobot_excav.testbed.picture_stream import Picture, PictureClient
+from lerobot_excav.testbed.picture_stream import Picture, PictureClient, depth_name
 
 
 class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped here
@@ -22,7 +22,10 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
     def __init__(self, config: StreamCameraConfig) -> None:
         super().__init__(config)
         self.config = config
-        self._client = PictureClient((config.host, config.port), config.name)
+        self.use_depth = config.use_depth
+        address = config.host, config.port
+        self._client = PictureClient(address, config.name)
+        self._depth_client = PictureClient(address, depth_name(config.name)) if config.use_depth else None
         self.latest_timestamp: float | None = None
         self.taken_us: int | None = None
 
@@ -44,17 +47,23 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
             DeviceError: Nobody is there, or no picture comes.
             ConfigurationError: It has another size than was said.
         """
-        self._client.connect(self.config.timeout_s)
+        oldest_ms = round(1e3 * self.config.timeout_s)
         try:
-            self.read_latest(round(1e3 * self.config.timeout_s))
+            self._client.connect(self.config.timeout_s)
+            self.read_latest(oldest_ms)
+            if self._depth_client is not None:
+                self._depth_client.connect(self.config.timeout_s)
+                self.read_latest_depth(oldest_ms)
         except (ConfigurationError, DeviceError):
-            self._client.close()
+            self.disconnect()
             raise
 
     @override
     def disconnect(self) -> None:
         """Disconnect."""
         self._client.close()
+        if self._depth_client is not None:
+            self._depth_client.close()
 
     @override
     def read(self) -> NDArray[np.uint8]:
@@ -85,14 +94,35 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         """
         return self._noted(self._client.newest(1e-3 * max_age_ms))
 
+    def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.uint16]:
+        """Return the newest depth image, (H, W, 1) [mm], at most so old [ms]; 0 where nothing was measured.
+
+        Raises:
+            DeviceError: It is older, or none is read.
+        """
+        if self._depth_client is None:
+            raise DeviceError(f"the stream camera {self.config.name!r} reads no depth; give it use_depth: true")
+        return self._checked(self._depth_client.newest(1e-3 * max_age_ms), 1).astype(np.uint16)
+
     def _noted(self, newest: Picture) -> NDArray[np.uint8]:
-        if not self.is_connected:
-            raise DeviceError(f"the stream camera {self.config.name!r} is not connected; call connect() first")
-        size = newest.pixels.shape[:2]
-        if size != (self.config.height, self.config.width):
-            raise ConfigurationError(
-                f"the stream camera {self.config.name!r} gives {size}, and was set up for "
-                f"{(self.config.height, self.config.width)} (height, width); give it the machine's size"
-            )
+        pixels = self._checked(newest, 3)
         self.taken_us, self.latest_timestamp = newest.taken_us, newest.came_s
-        return newest.pixels.copy()
+        return pixels.astype(np.uint8)
+
+    def _checked(self, newest: Picture, channels: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """Return what came, (H, W, channels), if it is what was asked for."""
+        config = self.config
+        if not self.is_connected:
+            raise DeviceError(f"the stream camera {config.name!r} is not connected; call connect() first")
+        *size, given = newest.pixels.shape
+        if tuple(size) != (config.height, config.width):
+            raise ConfigurationError(
+                f"the stream camera {config.name!r} gives {tuple(size)}, and was set up for "
+                f"{(config.height, config.width)} (height, width); give it the machine's size"
+            )
+        if given != channels:
+            raise ConfigurationError(
+                f"the stream camera {config.name!r} gives pictures of {given} channels in place of {channels}; "
+                "a depth stream is read by use_depth of the camera that it belongs to"
+            )
+        return newest.pixels

@@ -18,15 +18,30 @@ class PictureView:
         key: By which files of masks name it.
         words: What people say of the target.
         number: Tells one picture from another.
+        depth_m: (H, W) float32, registered with it: distance along the optical axis [m], NaN where nothing was
+            measured; None without a depth camera.
+        camera: Where its camera stood, and how it projects; None if nobody has calibrated it.
     """
 
-    def __init__(self, picture: NDArray[np.uint8], *, key: str, words: str, number: int = 0) -> None:
-        self._picture, self._key, self._words, self._number = picture, key, words, number
+    def __init__(
+        self,
+        picture: NDArray[np.uint8],
+        *,
+        key: str,
+        words: str,
+        number: int = 0,
+        depth_m: NDArray[np.float32] | None = None,
+        camera: PinholeCamera | None = None,
+    ) -> None:
+        self._key, self._words, self._number = key, words, number
+        self._shot = Shot(picture=picture, depth_m=depth_m, camera=camera)
 
     @property
     def camera(self) -> PinholeCamera:
-        """A camera of the picture's size; where it stood is not known."""
-        height, width = self._picture.shape[:2]
+        """The camera; of one that nobody has calibrated, its size alone means something."""
+        if self._shot.camera is not None:
+            return self._shot.camera
+        height, width = self._shot.size
         return PinholeCamera(position_w=np.zeros(3), axes_w=np.eye(3), fovy_rad=1.0, height=height, width=width)
 
     @property
@@ -36,29 +51,33 @@ class PictureView:
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the picture."""
-        return self._picture.copy()
+        return self._shot.picture.copy()
 
     def depth_m(self) -> NDArray[np.float32]:
-        """Refuse: nothing was measured.
+        """Return the depth image, (H, W) float32 [m].
 
         Raises:
-            ConfigurationError: Always.
+            ConfigurationError: There was no depth camera.
         """
-        raise ConfigurationError("this picture has no depth; use a mask source that needs none")
+        if self._shot.depth_m is None:
+            raise ConfigurationError("this picture has no depth; use a mask source that needs none")
+        return self._shot.depth_m.copy()
 
     def shot(self) -> Shot:
-        """Return the picture, without depth."""
-        return Shot(picture=self._picture)
+        """Return the picture, with depth and camera as far as they are known."""
+        return self._shot
 
     def command_key(self, command: Command) -> str:
         """Return the key."""
         return self._key
 
-    def place_w(self, command: Command) -> None:
-        """Nobody has said where the target was."""
+    def place_w(self, command: Command) -> NDArray[np.float64] | None:
+        """Return none: nobody has said where the target was."""
+        return None
 
-    def patch(self, place_w: NDArray[np.float64], shot: Shot) -> None:
-        """Targets are objects."""
+    def patch(self, place_w: NDArray[np.float64], shot: Shot) -> Pixels | None:
+        """Return none: targets are objects."""
+        return None
 
     def words(self, command: Command) -> str:
         """Return the words."""

@@ -153,9 +153,15 @@ def make_mask_source(name: str, *, options: str | None = None, text: str | None 
         return make()
     told = read_options(kind, name, None if options is None else Path(options))
     if text is not None:
-        require("text" in kind.model_fields, f"the text {text!r} has no effect: the mask source {name!r} does not read")
+        require(reads_text(name), f"the text {text!r} has no effect: the mask source {name!r} does not read")
         told = told.model_copy(update={"text": text})
     return make(told)
+
+
+def reads_text(name: str) -> bool:
+    """Tell whether a source can be told in words what to look for."""
+    kind = _SOURCES[name].options
+    return kind is not None and "text" in kind.model_fields
 
 
 def chooses_target(name: str) -> bool:

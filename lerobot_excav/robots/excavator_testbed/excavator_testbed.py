@@ -72,9 +72,13 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
 
     @property
     def observation_features(self) -> dict[str, type | tuple[int, int, int]]:
-        """Joint positions [rad] and velocities [rad/s] as those of the simulated machine, and the cameras."""
+        """Joint positions [rad] and velocities [rad/s] as those of the simulated machine, the cameras, and their depth.
+
+        Depth is called `<camera>_depth`, (H, W, 1) uint16 [mm], as with LeRobot's own robots.
+        """
         sizes = {name: (camera.height, camera.width, 3) for name, camera in self.cameras.items()}
-        return {**dict.fromkeys(STATE_NAMES, float), **sizes}
+        depths = {f"{name}_depth": (*sizes[name][:2], 1) for name, each in self.cameras.items() if _has_depth(each)}
+        return {**dict.fromkeys(STATE_NAMES, float), **sizes, **depths}
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -149,6 +153,8 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
         pictures, taken_us = {}, []
         for name, camera in self.cameras.items():
             pictures[name] = camera.async_read()
+            if _has_depth(camera):
+                pictures[f"{name}_depth"] = camera.read_latest_depth()
             taken_us.append(_taken_us(camera, link))  # now: cameras go on meanwhile
         self._taken_us = [at_us for at_us in taken_us if at_us is not None]
         return {**dict(zip(STATE_NAMES, values, strict=True)), **pictures}
@@ -250,6 +256,11 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
             if camera.is_connected:
                 camera.disconnect()
         self._log.close()
+
+
+def _has_depth(camera: Any) -> bool:
+    """Tell whether a camera of LeRobot measures depth as well."""
+    return bool(getattr(camera, "use_depth", False))
 
 
 def _taken_us(camera: Any, link: HostLink) -> int | None:

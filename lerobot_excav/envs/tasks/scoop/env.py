@@ -19,11 +19,12 @@ from lerobot_excav.envs.masks.source import Pixels
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.planner.candidates import Candidates, rate
 from lerobot_excav.envs.tasks.planner.plan import Plan, plan_targets
-from lerobot_excav.envs.tasks.planner.surface import SeenSurface, see_surface
+from lerobot_excav.envs.tasks.planner.surface import SeenSurface
 from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
 from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan, height_colours
+from lerobot_excav.envs.tasks.scoop.region_pixels import region_pixels
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
@@ -190,12 +191,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     @override
     def patch(self, place_w: NDArray[np.float64], shot: Shot) -> Pixels:
         """Return the pixels of a shot that show the soil of the region around a place; the machine is no soil."""
-        region = Target(center_w=place_w, yaw_rad=cylinder_from_world(place_w)[1])
-        points_w = shot.points_w()
-        assert shot.depth_m is not None  # or there were no points
-        assert shot.camera is not None
-        soil = see_surface(shot.depth_m, shot.camera)
-        return region.contains(points_w) & soil.shows(points_w)
+        return region_pixels(place_w, shot)
 
     @override
     def words(self, command: Command) -> str:
