@@ -88,7 +88,8 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data": 4, "train": 6, "val": 4, "test": 34, "checkpoint": 1, "report": 1, "all": 1}
+    stages = {"data_shard": 4, "data": 4, "train": 6, "val": 4, "play_shard": 34, "test": 34, "checkpoint": 1}
+    stages |= {"report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
 
@@ -98,25 +99,30 @@ def test_every_stage_of_the_excavator_is_planned(dig_plan):
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
 
 
+NAMES_OF_PARTS = ("out", "workers", "output_dir", "env.metrics_path", "env.render_every")  # differ from part to part
+
+
 def played(plan, command, first, number):
     """Return the scenes of every recording or evaluation, by what it is of."""
     scenes = {}
     for words in commands(plan):
         if words[: len(command)] == command:
             options = dict(word.lstrip("-").split("=", 1) for word in words[len(command) :])
-            kind = tuple(options.get(name) for name in ("targets", "target_rule", "policy.path", "env.task"))
+            kind = tuple(value for name, value in options.items() if name not in (first, number, *NAMES_OF_PARTS))
             start = int(options[first])
             scenes.setdefault(kind, []).extend(range(start, start + int(options[number])))
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-def test_shards_play_the_scenes_of_one_piece(dig_plan, tmp_path):
-    sharded = dry_run(
-        EXCAVATOR, tmp_path, "out=elsewhere", "results=page", "steps=2000", "data_shards=7", "play_shards=4"
-    )
-    assert (counts(sharded)["data_shard"], counts(sharded)["play_shard"]) == (21, 120)
+@pytest.mark.parametrize(("name", "shards"), [("plan", (28, 4 * 34)), ("dig_plan", (21, 4 * 30))])
+def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
+    snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
+    whole = request.getfixturevalue(name)
+    options = ("out=elsewhere", f"results={page}", "steps=2000", "data_shards=7", "play_shards=4")
+    sharded = dry_run(snakefile, tmp_path, *options)
+    assert (counts(sharded)["data_shard"], counts(sharded)["play_shard"]) == shards
     for ways in ((["lerobot-excav", "demos"], "first_scene", "scenes"), (["lerobot-eval"], "seed", "eval.n_episodes")):
-        assert played(sharded, *ways) == played(dig_plan, *ways)
+        assert played(sharded, *ways) == played(whole, *ways)
     assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
 
 
@@ -221,7 +227,7 @@ def test_test_scenes_are_for_the_table_and_training_scenes_for_training(plan):
         sets = [word.partition("=")[2] for word in words if word.startswith("--env.scene_set=")]
         folder = next((word for word in words if word.startswith("--output_dir=")), "")
         if words[0] == "lerobot-eval":
-            assert sets == [Path(folder.partition("=")[2]).parts[1]]
+            assert sets == [{"play": "test"}.get(name := Path(folder.partition("=")[2]).parts[1], name)]
         else:
             assert not sets
 
