@@ -20,6 +20,7 @@ rule data_shard:
         played=lambda wildcards: DATA[wildcards.data],
     log:
         f"{OUT}/shards/{{data}}/{{first}}-{{number}}.log",
+    threads: max(1, WORKERS)
     shell:
         "lerobot-excav demos {RECORDING} --first_scene={wildcards.first} --scenes={wildcards.number} {params.played} "
         "--workers={WORKERS} --out={output} --resume=true > {log} 2>&1"
@@ -28,7 +29,7 @@ rule data_shard:
 # LeRobot's own tool puts them together; every shard has its statistics already, and keeps its own video files.
 rule data:
     input:
-        lambda wildcards: ancient(shards_of(wildcards.data)),
+        lambda wildcards: unless_there(f"{OUT}/data/{wildcards.data}", ancient(shards_of(wildcards.data))),
     output:
         directory(f"{OUT}/data/{{data}}"),
     params:

@@ -12,6 +12,20 @@ def ranges(count, shards):
     return [(first, end - first) for first, end in zip(edges, edges[1:]) if end > first]
 
 
+def unless_there(made, needed):
+    """Return what a rule needs, or nothing if what it makes is there: Snakemake would make all of it again.
+
+    In how many parts something was made does not matter to what it is.
+    """
+    return [] if Path(made).exists() else needed
+
+
+def keep_videos(out, name, number):
+    """Return what puts the videos of the first part of a row where the page looks for them, in place of older ones."""
+    folder = f"{out}/videos/{name}"
+    return f" && rm -rf {folder} && mkdir -p {folder} && cp -r {out}/play/{name}/0-{number}/videos {folder}/"
+
+
 def merge_metrics(parts, whole):
     """Put metrics files together in their order, and say where the whole comes from.
 
