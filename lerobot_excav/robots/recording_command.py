@@ -16,6 +16,7 @@ from lerobot.utils.constants import HF_LEROBOT_HOME
 from lerobot_excav.envs.holder import holder_of
 from lerobot_excav.envs.masks.video import LOSSLESS_CODEC, LOSSLESS_PIX_FMTS, keeps_masks
 from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.testbed.picture_stream import FARTHEST_M
 
 LOSSLESS_FLAGS = (
     f"--dataset.rgb_encoder.vcodec={LOSSLESS_CODEC} --dataset.rgb_encoder.pix_fmt={LOSSLESS_PIX_FMTS[0]} "
@@ -51,7 +52,9 @@ def require_fitting_command(robot_config: Any) -> Any | None:
     return command
 
 
-def require_command_for_machine(robot_config: Any, *, rates: Sequence[int], has_mask: bool) -> None:
+def require_command_for_machine(
+    robot_config: Any, *, rates: Sequence[int], has_mask: bool, has_depth: bool = False
+) -> None:
     """Check that the command drives a machine at one of its rates, and stores its mask, if it has one, as it is.
 
     Raises:
@@ -61,6 +64,7 @@ def require_command_for_machine(robot_config: Any, *, rates: Sequence[int], has_
     if command is None:
         return
     faults = [*_rates_beside(command, rates), *(_blurred_mask(command) if has_mask else ())]
+    faults += _cut_depth(command) if has_depth else ()
     takes = f"takes {', '.join(map(str, rates))} actions a second"
     _require_none(faults, f"this command does not fit the machine, which {takes}")
 
@@ -168,6 +172,16 @@ def _blurred_mask(command: Any) -> Iterator[tuple[str, str]]:
             f"--dataset.video=true with vcodec={encoder.vcodec}, pix_fmt={encoder.pix_fmt} and crf={encoder.crf} "
             "blurs the target mask, and `lerobot-excav index` refuses such a recording",
             f"--dataset.video=false (or, for training with long chunks, {LOSSLESS_FLAGS})",
+        )
+
+
+def _cut_depth(command: Any) -> Iterator[tuple[str, str]]:
+    """Yield a range of recorded depth that ends before the dig area does, and the flag that mends it."""
+    recorded = recorded_dataset(command)
+    if recorded is not None and recorded.video and recorded.depth_encoder.depth_max < FARTHEST_M:
+        yield (
+            f"--dataset.depth_encoder.depth_max={recorded.depth_encoder.depth_max:g} cuts off what is farther away [m]",
+            f"--dataset.depth_encoder.depth_max={FARTHEST_M:g}",
         )
 
 

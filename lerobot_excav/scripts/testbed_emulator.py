@@ -107,18 +107,25 @@ def run(arguments: TestbedEmulatorArguments) -> int:
         has_depth=arguments.calibration is not None,
         on_over=lambda metrics: _tell(metrics, arguments.metrics),
     )
-    if arguments.calibration is not None:
-        arguments.calibration.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(arguments.calibration, calibration_text(site.camera))
     emulator = site.emulator
     print(f"the machine: {emulator.address[0]}:{emulator.address[1]}", flush=True)
     print(f"its cameras: {emulator.picture_address[0]}:{emulator.picture_address[1]}", flush=True)
     try:
+        if arguments.calibration is not None:
+            _write_calibration(arguments.calibration, calibration_text(site.camera))
         emulator.run(is_over.is_set)
     finally:
         site.close()
     print(f"{emulator.late_ticks} ticks took longer than they simulate")
     return 0
+
+
+def _write_calibration(path: Path, text: str) -> None:
+    """Write a calibration, unless somebody else's is there."""
+    is_other = path.exists() and path.read_text(encoding="utf-8") != text
+    require(not is_other, f"--calibration={path} holds another calibration; give the name of a new file")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, text)
 
 
 def _tell(metrics: dict[str, Any], path: Path | None) -> None:

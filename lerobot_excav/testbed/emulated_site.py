@@ -16,13 +16,10 @@ from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.envs.tasks.shown_source import shown_source
 from lerobot_excav.testbed.emulator import EmulatedMachine, Emulator
-from lerobot_excav.testbed.picture_stream import depth_name
+from lerobot_excav.testbed.picture_stream import FARTHEST_M, depth_name
 from lerobot_excav.testbed.protocol import RATE_HZ
 
 MASK = "target_mask"
-
-FARTHEST_MM = 20_000
-"""How far the emulated depth camera sees [mm] (kind: guess, of stereo cameras for outdoors)."""
 
 
 class EmulatedSite:
@@ -94,7 +91,7 @@ class EmulatedSite:
     def _depth_mm(self) -> NDArray[np.uint16]:
         """Return the depth of `main`, (H, W) [mm]; as of a depth camera, 0 for what is too far away."""
         depth_mm = np.rint(1e3 * self._env.depth_m())
-        return np.where(depth_mm <= FARTHEST_MM, depth_mm, 0.0).astype(np.uint16)
+        return np.where(depth_mm <= 1e3 * FARTHEST_M, depth_mm, 0.0).astype(np.uint16)
 
     def _look(self) -> None:
         """Make the mask of a new command."""

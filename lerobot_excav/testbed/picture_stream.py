@@ -26,6 +26,9 @@ _HEADER = struct.Struct("<QI")
 LONGEST_NAME = 64
 _MOST_BYTES = 50_000_000
 
+FARTHEST_M = 20.0
+"""How far depth cameras see at most [m] (kind: guess, of stereo cameras for outdoors)."""
+
 _BUFFER_BYTES = 65536  # of the system: more would queue old pictures for who is slow
 _LOOK_EVERY_S = 1.0  # whether a client that waits is still there
 
@@ -195,6 +198,24 @@ class PictureClient:
             DeviceError: None comes in time.
         """
         return self._after(self._count, timeout_s)
+
+    def since(self, taken_us: int, timeout_s: float) -> Picture:
+        """Return the newest picture, once it was taken at a time of the machine's clock [us] or later.
+
+        Raises:
+            DeviceError: None comes in time.
+        """
+        with self._change:
+            self._change.wait_for(
+                lambda: (self._newest is not None and self._newest.taken_us >= taken_us) or self._socket is None,
+                timeout_s,
+            )
+            if self._newest is None or self._newest.taken_us < taken_us:
+                raise DeviceError(f"no picture of {self._name!r} came within {timeout_s:.2f} s; is the machine on?")
+            return self._newest
+
+    def _has(self, taken_us: int) -> bool:
+        return self._newest is not None and self._newest.taken_us >= taken_us
 
     def _after(self, seen: int, timeout_s: float) -> Picture:
         """Wait for a picture that is not among the first `seen`."""

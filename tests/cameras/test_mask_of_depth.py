@@ -16,6 +16,7 @@ from lerobot.cameras.utils import make_cameras_from_configs
 
 import lerobot_excav.plugin  # noqa: F401 - registers the types
 from lerobot_excav.cameras.mask_camera.calibration import Calibration, calibration_text, read_calibration
+from lerobot_excav.cameras.mask_camera.registered_depth import registered_depth_m
 from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.masks.segment_anything import SegmentAnything
@@ -87,11 +88,11 @@ class AnyRobotConfig:
 def mask_of(monkeypatch, tmp_path):
     """Return the mask of a camera that stands where that of a scene stands, and sees what that sees."""
 
-    def _mask(env, mask, *, depth_mm=None, use_depth="true", look=None):
+    def _mask(env, mask, *, depth_mm=None, use_depth="true", look=None, unit_m=1e-3):
         monkeypatch.setattr(MeasuredCamera, "picture", env.picture())
         monkeypatch.setattr(MeasuredCamera, "depth_mm", measured_mm(env) if depth_mm is None else depth_mm)
         path = tmp_path / "calibration.toml"
-        path.write_text(calibration_text(env.camera))
+        path.write_text(f"{calibration_text(env.camera)}depth_unit_m = {unit_m}\n")
         top = f"{{type: shared, name: top, camera: {{type: measured, fps: 30, use_depth: {use_depth}, {SIZE}}}}}"
         told = f"{{type: mask, of: top, calibration: {path}, {SIZE}, {mask}}}"
         flag = f"--cameras={{top: {top}, target_mask: {told}}}"
@@ -181,7 +182,7 @@ def test_where_nothing_may_be_dug_nothing_is_pointed_at(pile, mask_of):
     other = mask_of(pile, f"{PLANNED}, keep_out: '{barred}'")
     assert other.any()
     assert overlap(usual, other) < 0.1
-    with pytest.raises(MaskMissingError, match="no region of the pile that is worth a cycle"):
+    with pytest.raises(MaskMissingError, match=r"no region of the pile is worth a cycle: .*barred by keep_out"):
         mask_of(pile, f"{PLANNED}, keep_out: '{EVERYWHERE}'")
 
 
@@ -210,6 +211,40 @@ def test_a_click_on_the_ground_marks_the_region_around_it(pile, mask_of, tmp_pat
     place_w = pile.plan.proposals[number].target.center_w
     mask = mask_of(pile, click_at(tmp_path / "live.toml", pile, place_w) + ", targets: regions")
     assert overlap(mask, true_region(pile, place_w)) > 0.7
+
+
+def test_what_reaches_into_a_zone_or_out_of_reach_is_refused_whoever_points_there(pile, mask_of, tmp_path):
+    place_w = pile.plan.proposals[0].target.center_w
+    x_w, y_w, _ = place_w
+    zone = f"keep_out: '{x_w - 0.1:.2f},{y_w - 0.1:.2f},{x_w + 0.1:.2f},{y_w + 0.1:.2f}'"
+    live = tmp_path / "live.toml"
+    clicked = click_at(live, pile, place_w)
+    with pytest.raises(ConfigurationError, match="barred by keep_out"):
+        mask_of(pile, f"{clicked}, targets: regions, {zone}")
+    row, column = pile.camera.pixel(place_w)
+    corners = [[(column + x) / WIDTH, (row + y) / HEIGHT] for x, y in ((-4, -4), (4, -4), (4, 4), (-4, 4))]
+    live.write_text(f'[[mask]]\nkey = "live"\npolygon = {np.array(corners).tolist()}\n')
+    assert mask_of(pile, f"source: manual, options: {live}, targets: regions").any()
+    with pytest.raises(ConfigurationError, match="reaches into a zone"):
+        mask_of(pile, f"source: manual, options: {live}, targets: regions, {zone}")
+    with pytest.raises(ConfigurationError, match="m from the swing axis"):
+        mask_of(pile, click_at(live, pile, np.array([3.5, 0.0, 0.0])) + ", targets: regions")
+
+
+def test_a_camera_that_counts_in_tenths_of_a_millimetre_says_so_in_its_calibration(blocks, mask_of, tmp_path):
+    clicked = click_at(tmp_path / "live.toml", blocks, blocks.place_w(blocks.command))
+    tenths = np.rint(1e4 * blocks.depth_m()).clip(max=65535).astype(np.uint16)
+    mask = mask_of(blocks, clicked, depth_mm=tenths, unit_m=1e-4)
+    assert overlap(mask, mask_of(blocks, clicked)) > 0.9
+
+
+@pytest.mark.parametrize(("width", "is_filled"), [(1, True), (6, True), (7, False), (20, False)])
+def test_a_narrow_hole_is_filled_and_a_wide_one_stays_whole(width, is_filled):
+    depth_mm = np.full((40, 40, 1), 5000, np.uint16)
+    depth_mm[10 : 10 + width, 10 : 10 + width] = 0
+    depth_m = registered_depth_m(depth_mm, np.zeros((40, 40, 3), np.uint8), camera="top", unit_m=1e-3)
+    assert np.isnan(depth_m).sum() == (0 if is_filled else width * width)
+    assert np.nanmax(np.abs(depth_m - 5.0)) < 1e-6
 
 
 def test_a_click_on_an_object_marks_the_object(blocks, mask_of, tmp_path):
@@ -250,7 +285,10 @@ def test_a_vision_language_model_is_shown_the_depth_and_its_place_is_marked(pile
             ConfigurationError,
             "regist",
         ),
-        ("source: geometry", {}, ConfigurationError, "needs the place of the target"),
+        ("source: geometry", {}, ConfigurationError, "give targets: regions"),
+        ("source: click, options: m.toml", {}, ConfigurationError, "does not look at depth"),
+        ("source: grounded_sam, text: sand", {}, ConfigurationError, "does not look at depth"),
+        (f"{PLANNED}, snap: true", {}, ConfigurationError, "snap takes objects"),
         ("source: vlm_dig", {}, ConfigurationError, "give targets: regions"),
         ("source: manual, options: m.toml, keep_out: '0,0,1,1'", {}, ConfigurationError, "no effect"),
         ("source: oracle, targets: regions", {}, ConfigurationError, "asks a simulator"),

@@ -18,6 +18,8 @@ from lerobot_excav.envs.machines.excavator.cameras import MAIN
 from lerobot_excav.errors import ConfigurationError, DeviceError
 from lerobot_excav.testbed.picture_stream import PictureServer
 
+from .conftest import until
+
 SIZE = (6, 8)
 COLOURS = np.full((*SIZE, 3), 7, np.uint8)
 
@@ -72,9 +74,28 @@ def test_who_does_not_ask_for_depth_gets_none(server, camera):
 def test_a_machine_without_depth_is_refused_at_once_by_who_asks_for_it(server, camera):
     server.show("blind", 1, COLOURS)
     asking = camera("blind", use_depth=True)
-    with pytest.raises(DeviceError, match="no picture of 'blind_depth' came"):
+    with pytest.raises(DeviceError, match="offers no depth of 'blind'"):
         asking.connect()
     assert not asking.is_connected
+
+
+def test_depth_is_that_of_the_picture_and_is_waited_for_only_so_long(server, camera):
+    def show(taken_us, value, *, depth_too=True):
+        server.show("paired", taken_us, COLOURS + np.uint8(value))
+        if depth_too:
+            server.show("paired_depth", taken_us, np.full(SIZE, value, np.uint16), lossless=True)
+
+    show(1, 1)
+    paired = camera("paired", use_depth=True, max_age_s=2.0)
+    paired.connect()
+    for number in range(2, 20):
+        show(number, number)
+        value = paired.async_read()[0, 0, 0] - 7
+        assert paired.read_latest_depth()[0, 0, 0] >= value
+    show(20, 20, depth_too=False)
+    until(lambda: paired.async_read()[0, 0, 0] == 27)
+    with pytest.raises(DeviceError, match=r"no picture of 'paired_depth' came within 2\.00 s"):
+        paired.read_latest_depth()
 
 
 def test_depth_is_not_taken_for_a_picture_nor_a_picture_for_depth(server, camera):
@@ -89,7 +110,8 @@ def test_depth_is_not_taken_for_a_picture_nor_a_picture_for_depth(server, camera
 
 @pytest.mark.slow
 def test_the_emulator_measures_depth_and_says_where_its_camera_stands(camera, tmp_path):
-    path = tmp_path / "made/main.toml"
+    path, other = tmp_path / "made/main.toml", tmp_path / "measured.toml"
+    other.write_text("position_w = [0, 0, 1]")
     command = [sys.executable, "-m", "lerobot_excav.scripts.main", "testbed-emulator", "--port=0", "--picture_port=0"]
     process = subprocess.Popen(
         [*command, f"--calibration={path}", "--env.fidelity=fast"], stdout=subprocess.PIPE, text=True
@@ -105,6 +127,8 @@ def test_the_emulator_measures_depth_and_says_where_its_camera_stands(camera, tm
     finally:
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=30.0) == 0
+    assert subprocess.run([*command, f"--calibration={other}"], capture_output=True, check=False).returncode != 0
+    assert other.read_text() == "position_w = [0, 0, 1]"
     seen = read_calibration(path).camera(96, 128)
     assert np.allclose(seen.position_w, MAIN.position)
     points_w = seen.points_w(1e-3 * depth_mm[..., 0].astype(float))

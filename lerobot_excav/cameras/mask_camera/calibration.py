@@ -3,6 +3,7 @@
     position_w = [3.6, -4.6, 7.4]    # eye point [m], world frame
     target_w = [-0.5, 0.25, 0.2]     # a point on the optical axis [m]; the upper edge of the picture points up
     fovy_deg = 46.0                  # vertical field of view of the colour picture
+    depth_unit_m = 0.001             # of the depth image; some cameras count in tenths of a millimetre
 
 A camera that does not stand upright takes `axes_w` in place of `target_w`: three rows of the rotation whose columns are
 its right, up and backward axes.
@@ -32,6 +33,7 @@ class Calibration(BaseModel):
     target_w: Point | None = None
     axes_w: tuple[Point, Point, Point] | None = None
     fovy_deg: Annotated[float, Field(gt=0.0, lt=180.0)]
+    depth_unit_m: Annotated[float, Field(gt=0.0, le=0.01)] = 0.001
 
     @model_validator(mode="after")
     def _says_where_it_looks(self) -> Self:

@@ -61,14 +61,27 @@ class MaskCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's classes
 
     def __post_init__(self) -> None:
         check_settings(self, "mask camera: ")
+        self._check_targets()
+
+    def _check_targets(self) -> None:
+        """Refuse what has no effect, or cannot be."""
         is_regions = self.targets == "regions"
         require(
             not is_regions or self.calibration is not None,
             "mask camera: targets=regions needs calibration=FILE, and a shared camera that measures depth",
         )
         require(
-            is_regions or not chooses_target(self.source),
+            is_regions or not (chooses_target(self.source) or self.source == "geometry"),
             f"mask camera: source={self.source} chooses where to dig by itself; give targets: regions",
+        )
+        require(
+            self.calibration is None or self.source not in ("click", *(() if is_regions else ("grounded_sam",))),
+            f"mask camera: source={self.source} does not look at depth; leave calibration and targets away, or give "
+            "source: manual, whose clicks do",
+        )
+        require(
+            not (is_regions and self.snap),
+            "mask camera: snap takes objects, and targets=regions are none; leave one of them away",
         )
         zones = parsed_zones("mask camera: keep_out", self.keep_out)
         require(not zones or is_regions, f"mask camera: keep_out={self.keep_out!r} has no effect with targets=objects")

@@ -1,6 +1,7 @@
 """The mask camera itself."""
 
 import logging
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, override
 
@@ -15,7 +16,7 @@ from lerobot_excav.cameras.shared_camera.shared_camera import SharedCamera
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.picture_view import PictureView
 from lerobot_excav.envs.masks.snapped import SnappedMasks
-from lerobot_excav.envs.masks.source import MaskMissingError, make_mask_source, reads_text
+from lerobot_excav.envs.masks.source import MaskMissingError, MaskSource, make_mask_source, reads_text
 from lerobot_excav.envs.tasks.scoop.pile_view import PileView
 from lerobot_excav.errors import ConfigurationError, DeviceError
 
@@ -45,6 +46,8 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         self._calibration = None if config.calibration is None else read_calibration(config.calibration)
         self._is_connected = False
         self._made_for: _Told | None = None
+        self._source: tuple[_Told, MaskSource] | None = None
+        self._number = 0
         self._mask: NDArray[np.uint8] | None = None
 
     @property
@@ -81,7 +84,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
             raise DeviceError(f"the mask camera of {self.config.of!r} is not connected; call connect() first")
         told = self._read_told()
         if self._mask is None or told != self._made_for:
-            self._mask = self._make(told.words)
+            self._mask = self._make(told)
             self._made_for = told
         return self._mask.copy()
 
@@ -100,7 +103,7 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
         words = config.text if config.command is None else _read("command", config.command).strip()
         return _Told(words, None if config.options is None else _read("options", Path(config.options)))
 
-    def _make(self, told: str | None) -> NDArray[np.uint8]:
+    def _make(self, told: _Told) -> NDArray[np.uint8]:
         config = self.config
         shared = SharedCamera.connected.get(config.of)
         if shared is None:
@@ -108,35 +111,47 @@ class MaskCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyped
                 f"no shared camera {config.of!r} is connected; give the robot one: {{type: shared, name: {config.of}, "
                 "camera: ...}"
             )
-        picture = shared.last_picture()
+        # Depth is of now, so the picture has to be as well.
+        picture = shared.last_picture() if self._calibration is None else shared.async_read()
         if picture.shape[:2] != (config.height, config.width):
             raise ConfigurationError(
                 f"the shared camera {config.of!r} gives {picture.shape[:2]}, the mask camera was set up for "
                 f"{(config.height, config.width)} (height, width); give both the same size"
             )
-        text = told if config.command is None or reads_text(config.source) else None  # or the file only says when
-        source = make_mask_source(config.source, options=config.options, text=text)
-        source = SnappedMasks(source) if config.snap else source
-        mask = source.mask(self._view(shared, picture, told or ""), Command(target_id=0, region=None))
+        view = self._view(shared, picture, told.words or "")
+        mask = self._source_of(told).mask(view, Command(target_id=0, region=None))
         if mask is None or not mask.pixels.any():
+            sought = f" for {told.words or config.options!r}" * bool(told.words or config.options)
             raise MaskMissingError(
-                f"source={config.source!r} of the mask camera finds nothing in the picture of {config.of!r} for "
-                f"{told or config.options!r}, so a policy had no target; say it otherwise, or move the camera"
+                f"source={config.source!r} of the mask camera finds nothing in the picture of {config.of!r}{sought}, "
+                "so a policy had no target; say it otherwise, or move the camera"
             )
+        if isinstance(view, PileView):
+            view.require_free(mask.pixels)
         if mask.parameters:
             logger.info("mask of %r by %s: %s", config.of, mask.source, dict(mask.parameters))
         return mask.img
 
+    def _source_of(self, told: _Told) -> MaskSource:
+        """Return the source for what was told; the same one for the same words, whose weights are loaded then."""
+        config = self.config
+        words = told.words if config.command is None or reads_text(config.source) else None  # the file only says when
+        heard = told._replace(words=words)
+        if self._source is None or self._source[0] != heard:
+            source = make_mask_source(config.source, options=config.options, text=words)
+            self._source = heard, SnappedMasks(source) if config.snap else source
+        return self._source[1]
+
     def _view(self, shared: SharedCamera, picture: NDArray[np.uint8], words: str) -> PictureView:
         """Return what the source may look at."""
+        self._number += 1
         if self._calibration is None:
-            return PictureView(picture, key=KEY, words=words)
+            return PictureView(picture, key=KEY, words=words, number=self._number)
         camera = self._calibration.camera(*picture.shape[:2])
-        depth_m = registered_depth_m(shared.read_latest_depth(), picture, shared.name)
-        if self.config.targets == "regions":
-            zones = self.config.zones
-            return PileView(picture, key=KEY, words=words, depth_m=depth_m, camera=camera, zones=zones)
-        return PictureView(picture, key=KEY, words=words, depth_m=depth_m, camera=camera)
+        depth = shared.read_latest_depth()
+        depth_m = registered_depth_m(depth, picture, camera=shared.name, unit_m=self._calibration.depth_unit_m)
+        kind = PictureView if self.config.targets == "objects" else partial(PileView, zones=self.config.zones)
+        return kind(picture, key=KEY, words=words, number=self._number, depth_m=depth_m, camera=camera)
 
 
 def _read(field: str, path: Path) -> str:

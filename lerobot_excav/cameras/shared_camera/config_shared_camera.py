@@ -33,6 +33,10 @@ class SharedCameraConfig(CameraConfig):  # type: ignore[misc]  # LeRobot's class
 
     def __post_init__(self) -> None:
         check_settings(self, "shared camera: ")
+        require(
+            getattr(self.camera, "use_rgb", True),
+            f"use_rgb=false of the shared camera {self.name!r} is not possible: mask cameras look at its pictures",
+        )
         for field in ("fps", "width", "height"):
             own, given = getattr(self.camera, field), getattr(self, field)
             require(

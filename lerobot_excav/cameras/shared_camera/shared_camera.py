@@ -86,8 +86,8 @@ class SharedCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         """Whether the camera measures depth as well."""
         return bool(getattr(self._camera, "use_depth", False))
 
-    def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.uint16]:
-        """Return the newest depth image, (H, W, 1) [mm], 0 where nothing was measured.
+    def read_latest_depth(self, max_age_ms: int | None = None) -> NDArray[np.uint16]:
+        """Return the newest depth image as the camera gives it, (H, W, 1), 0 where nothing was measured.
 
         Raises:
             DeviceError: The camera measures none.
@@ -96,7 +96,8 @@ class SharedCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
             raise DeviceError(
                 f"the shared camera {self.name!r} measures no depth; give its camera use_depth: true, if it can"
             )
-        return np.asarray(self._camera.read_latest_depth(max_age_ms), np.uint16)
+        oldest = {} if max_age_ms is None else {"max_age_ms": max_age_ms}
+        return np.asarray(self._camera.read_latest_depth(**oldest), np.uint16)
 
     def last_picture(self) -> NDArray[np.uint8]:
         """Return the picture that was read last, or read one."""

@@ -32,7 +32,7 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
     @property
     def is_connected(self) -> bool:
         """Whether pictures come."""
-        return self._client.is_connected
+        return self._client.is_connected and (self._depth_client is None or self._depth_client.is_connected)
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
@@ -50,13 +50,23 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         oldest_ms = round(1e3 * self.config.timeout_s)
         try:
             self._client.connect(self.config.timeout_s)
+            if self._depth_client is not None:
+                self._connect_depth(self._depth_client)
             self.read_latest(oldest_ms)
             if self._depth_client is not None:
-                self._depth_client.connect(self.config.timeout_s)
                 self.read_latest_depth(oldest_ms)
         except (ConfigurationError, DeviceError):
             self.disconnect()
             raise
+
+    def _connect_depth(self, client: PictureClient) -> None:
+        try:
+            client.connect(self.config.timeout_s)
+        except DeviceError as error:
+            raise DeviceError(
+                f"the machine offers no depth of {self.config.name!r}; leave use_depth away (the emulator has depth "
+                "with --calibration)"
+            ) from error
 
     @override
     def disconnect(self) -> None:
@@ -94,15 +104,22 @@ class StreamCamera(Camera):  # type: ignore[misc]  # LeRobot's classes are untyp
         """
         return self._noted(self._client.newest(1e-3 * max_age_ms))
 
-    def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.uint16]:
-        """Return the newest depth image, (H, W, 1) [mm], at most so old [ms]; 0 where nothing was measured.
+    def read_latest_depth(self, max_age_ms: int | None = None) -> NDArray[np.uint16]:
+        """Return the depth image of the picture that was read last, or a later one, (H, W, 1) [mm]; 0: not measured.
+
+        It comes by a way of its own, and is waited for.
+
+        Args:
+            max_age_ms: How long to wait [ms]; `max_age_s` by default.
 
         Raises:
-            DeviceError: It is older, or none is read.
+            DeviceError: It does not come, or none is read.
         """
         if self._depth_client is None:
             raise DeviceError(f"the stream camera {self.config.name!r} reads no depth; give it use_depth: true")
-        return self._checked(self._depth_client.newest(1e-3 * max_age_ms), 1).astype(np.uint16)
+        timeout_s = self.config.max_age_s if max_age_ms is None else 1e-3 * max_age_ms
+        newest = self._depth_client.since(self.taken_us or 0, timeout_s)
+        return self._checked(newest, 1).astype(np.uint16)
 
     def _noted(self, newest: Picture) -> NDArray[np.uint8]:
         pixels = self._checked(newest, 3)

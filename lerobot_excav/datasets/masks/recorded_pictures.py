@@ -36,7 +36,7 @@ def first_pictures(root: Path, camera_key: str) -> Any:
     from lerobot.datasets import LeRobotDataset
 
     dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav")
-    cameras = dataset.meta.camera_keys
+    cameras = [key for key in dataset.meta.camera_keys if key not in dataset.meta.depth_keys]
     if camera_key not in cameras:
         raise DatasetError(f"--main_camera={camera_key} is no camera of {root}; allowed: {', '.join(cameras)}")
 

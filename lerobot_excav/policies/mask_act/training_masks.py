@@ -161,7 +161,8 @@ def stored_key(config: MaskACTConfig, meta: LeRobotDatasetMetadata) -> str | Non
     """Return the mask's name in the dataset; `--rename_map` may have changed it: None if several come into question."""
     if config.mask_key in meta.camera_keys:
         return config.mask_key
-    renamed = [key for key in meta.camera_keys if key not in config.image_features]
+    pictures = [key for key in meta.camera_keys if key not in meta.depth_keys]
+    renamed = [key for key in pictures if key not in config.image_features]
     return renamed[0] if len(renamed) == 1 else None
 
 

@@ -63,6 +63,10 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
         )
         super().__post_init__()
         check_settings(self, "robot.")
+        blind = [name for name, camera in self.cameras.items() if not getattr(camera, "use_rgb", True)]
+        require(
+            not blind, f"use_rgb=false of robot.cameras.{', '.join(blind)} is not possible: policies look at pictures"
+        )
         host, _ = self.host_and_port
         require(
             self.dead_man != "always" or is_loopback(host),
@@ -76,6 +80,11 @@ class ExcavatorTestbedConfig(RobotConfig):  # type: ignore[misc]  # LeRobot's cl
         return "target_mask" in self.cameras or any(
             isinstance(each, MaskCameraConfig) for each in self.cameras.values()
         )
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether one of the cameras measures depth."""
+        return any(getattr(each, "use_depth", False) for each in self.cameras.values())
 
     @property
     def host_and_port(self) -> tuple[str, int]:

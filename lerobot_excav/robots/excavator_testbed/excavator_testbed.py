@@ -58,7 +58,7 @@ class ExcavatorTestbed(Robot):  # type: ignore[misc]  # LeRobot's classes are un
     def __init__(self, config: ExcavatorTestbedConfig) -> None:
         super().__init__(config)
         self.config = config
-        require_command_for_machine(config, rates=FRAME_RATES, has_mask=config.has_mask)
+        require_command_for_machine(config, rates=FRAME_RATES, has_mask=config.has_mask, has_depth=config.has_depth)
         self.cameras = make_cameras_from_configs(config.cameras)
         self.link: HostLink | None = None
         self._heard: Heard | None = None

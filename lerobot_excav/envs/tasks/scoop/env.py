@@ -6,7 +6,6 @@ from typing import Any, cast, override
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.machines.excavator.control import checked_action
 from lerobot_excav.envs.machines.excavator.layout import cylinder_from_world
 from lerobot_excav.envs.machines.excavator.rehearsal import rehearse
@@ -24,7 +23,7 @@ from lerobot_excav.envs.tasks.relief import Relief
 from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.environment_state import environment_state
 from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan, height_colours
-from lerobot_excav.envs.tasks.scoop.region_pixels import region_pixels
+from lerobot_excav.envs.tasks.scoop.region_pixels import region_pixels, require_pointable
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.stage import draw_start
@@ -34,10 +33,6 @@ from lerobot_excav.errors import require
 
 # Reward scale: a full bucket of sand [kg] (reference figure of the paper's operator; kind: paper).
 FULL_BUCKET_KG = 485.0
-
-POINTABLE_RADIUS_M = (2.6, 6.4)
-"""Distance from the swing axis at which a person may command a region [m]: the planner's, and 0.2 to 0.3 m more (kind:
-guess)."""
 
 
 class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
@@ -206,11 +201,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     @override
     def _target_at(self, place_w: NDArray[np.float64]) -> int:
         """Make a region around a place of the ground a further target of the scene."""
-        radius_m, (low_m, high_m) = float(np.hypot(*(place_w[:2] - MACHINE_POS_W[:2]))), POINTABLE_RADIUS_M
-        require(
-            low_m <= radius_m <= high_m,
-            f"this place is {radius_m:.1f} m from the swing axis; the bucket digs from {low_m} to {high_m} m",
-        )
+        require_pointable(place_w)
         region = Target(center_w=place_w.copy(), yaw_rad=cylinder_from_world(place_w)[1])
         self.cycle.scene = replace(self.scene, targets=(*self.scene.targets, region))
         return len(self.scene.targets) - 1
