@@ -441,6 +441,8 @@ cameras = Rule(lambda v: isinstance(v, dict) and not v, ({},))  # LeRobot's own;
 
 PICTURES = {"width": whole(1, 8192), "height": whole(1, 8192), "fps": whole(1, 1000)}
 
+MASK_CAMERA = {**PICTURES, "of": text, "options": optional(text), "text": optional(text), "command": optional(path)}
+
 CONFIGURATIONS = {
     "stream camera": (
         StreamCameraConfig,
@@ -456,19 +458,34 @@ CONFIGURATIONS = {
     ),
     "mask camera": (
         MaskCameraConfig,
-        {
-            **PICTURES,
-            "of": text,
-            "source": one_of("oracle", "click", "geometry", "manual", "grounded_sam"),
-            "options": optional(text),
-            "text": optional(text),
-            "command": optional(path),
+        MASK_CAMERA
+        | {
+            "source": one_of("oracle", "click", "manual", "grounded_sam"),
             "snap": flag,
             "calibration": optional(path),
             "targets": one_of("objects"),
             "keep_out": one_of("none"),
         },
         {"of": "top", "source": "manual", "width": 128, "height": 96},
+    ),
+    "mask camera of regions": (
+        MaskCameraConfig,
+        MASK_CAMERA
+        | {
+            "source": one_of("oracle", "geometry", "manual", "grounded_sam", "vlm_dig"),
+            "snap": Rule(lambda v: v is False),
+            "calibration": path,
+            "targets": one_of("regions"),
+            "keep_out": Rule(lambda v: isinstance(v, str) and v in ZONES, (*ZONES, *NO_ZONES)),
+        },
+        {
+            "of": "top",
+            "source": "geometry",
+            "targets": "regions",
+            "calibration": Path("main.toml"),
+            "width": 128,
+            "height": 96,
+        },
     ),
     "mask_act": (MaskACTConfig, POLICY, {"device": "cpu"}),
     "excavator": (
