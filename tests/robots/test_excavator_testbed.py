@@ -35,9 +35,12 @@ SIZE = {"observation_height": 96, "observation_width": 128}
 
 def cameras_of(served, names=("main", "cab", "target_mask")):
     port = served.emulator.picture_address[1]
-    return {
+    cameras = {
         name: {"type": "stream", "port": port, "name": name, "fps": 10, "width": 128, "height": 96} for name in names
     }
+    if served.has_depth:
+        cameras["main"]["use_depth"] = True
+    return cameras
 
 
 @pytest.fixture
@@ -221,11 +224,13 @@ def rollout(monkeypatch, tmp_path):
         signal.signal(each, handler)
 
 
-def test_the_trained_policy_drives_it_and_every_recorded_frame_has_its_ages(rollout, tmp_path):
+@pytest.mark.parametrize("has_depth", [False, True])
+def test_the_trained_policy_drives_it_and_every_recorded_frame_has_its_ages(rollout, tmp_path, has_depth):
+    """Also where the machine has depth, of which the policy knows nothing."""
     values = {"repo_id": "someone/rollout_testbed", "root": tmp_path / "data", "single_task": "dig", "fps": 10}
     values |= {"video": "false", "push_to_hub": "false", "no_stamp": "true"}
     values |= {"num_episodes": 1, "episode_time_s": 4, "reset_time_s": 0}
-    with emulated({**SIZE, "scene_set": "val"}) as served:
+    with emulated({**SIZE, "scene_set": "val"}, has_depth=has_depth) as served:
         before = served.site._env.world.machine.joint_pos
         rollout(served, "episodic", *(f"--dataset.{name}={value}" for name, value in values.items()))
         moved = np.abs(served.site._env.world.machine.joint_pos - before)
@@ -234,4 +239,5 @@ def test_the_trained_policy_drives_it_and_every_recorded_frame_has_its_ages(roll
     lines = [json.loads(line) for line in (tmp_path / "alignment.jsonl").read_text().splitlines()][1:]
     assert [line["frame_index"] for line in lines] == list(range(len(dataset)))
     assert dataset[0]["observation.state"].shape == (8,)
+    assert ("observation.images.main_depth" in dataset.features) == has_depth
     assert all(line["image_age_ms"] >= 0.0 and line["state_age_ms"] >= 0.0 for line in lines)

@@ -45,7 +45,7 @@ def emulated(settings=None, port=0, *, has_depth=False, **machine):
             site.close()
 
     try:
-        yield SimpleNamespace(emulator=site.emulator, site=site, cycles=cycles, stop=stop)
+        yield SimpleNamespace(emulator=site.emulator, site=site, cycles=cycles, has_depth=has_depth, stop=stop)
     finally:
         stop()
 
