@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lerobot.cameras import Camera, CameraConfig
+from lerobot.cameras import CameraConfig
 from lerobot.cameras.utils import make_cameras_from_configs
 
 import lerobot_excav.plugin  # noqa: F401 - registers the types
@@ -26,6 +26,8 @@ from lerobot_excav.envs.tasks.clear.env import ClearEnv
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.errors import ConfigurationError, DeviceError
+
+from .test_mask_camera import PaintedCamera
 
 HEIGHT, WIDTH = 192, 256
 SIZE = f"width: {WIDTH}, height: {HEIGHT}"
@@ -42,33 +44,12 @@ class MeasuredCameraConfig(CameraConfig):
     use_depth: bool = True
 
 
-class MeasuredCamera(Camera):
+class MeasuredCamera(PaintedCamera):
     picture = depth_mm = None
 
     def __init__(self, config):
         super().__init__(config)
-        self.use_depth, self.is_open = config.use_depth, False
-
-    is_connected = property(lambda self: self.is_open)
-
-    @staticmethod
-    def find_cameras():
-        return []
-
-    def connect(self, warmup=True):  # noqa: FBT002 - LeRobot's own signature
-        self.is_open = True
-
-    def disconnect(self):
-        self.is_open = False
-
-    def read(self):
-        return self.picture.copy()
-
-    def async_read(self, timeout_ms=200.0):
-        return self.read()
-
-    def read_latest(self, max_age_ms=500):
-        return self.read()
+        self.use_depth = config.use_depth
 
     def read_latest_depth(self, max_age_ms=500):
         return self.depth_mm[..., None].copy()
