@@ -1,5 +1,6 @@
 """A real pile before a real camera that measures depth, as a view for mask sources."""
 
+from functools import cached_property
 from typing import override
 
 import numpy as np
@@ -50,6 +51,10 @@ class PileView(PictureView):
         super().__init__(picture, key=key, words=words, number=number, depth_m=depth_m, camera=camera)
         self._zones = zones
 
+    @cached_property
+    def _surface(self) -> SeenSurface:
+        return see_surface(self.depth_m(), self.camera)
+
     @override
     def place_w(self, command: Command) -> NDArray[np.float64]:
         """Return the middle of the region that the planner proposes, (3,) [m].
@@ -57,10 +62,9 @@ class PileView(PictureView):
         Raises:
             MaskMissingError: No region that is seen is worth a cycle.
         """
-        surface = see_surface(self.depth_m(), self.camera)
-        plan = self.planned(surface)
+        plan = self.planned(self._surface)
         for proposal in plan.proposals:
-            if _seen_share(proposal.target, surface) >= LEAST_SEEN:
+            if _seen_share(proposal.target, self._surface) >= LEAST_SEEN:
                 return proposal.target.center_w
         why = plan.nothing_left or "too little was measured of those that are"
         raise MaskMissingError(f"no region of the pile is worth a cycle: {why}")
@@ -73,7 +77,7 @@ class PileView(PictureView):
             ConfigurationError: The bucket does not reach the place, or a keep-out zone bars it.
         """
         require_pointable(place_w)
-        rated = self.rated(place_w[None], see_surface(self.depth_m(), self.camera))
+        rated = self.rated(place_w[None], self._surface)
         where = ", ".join(f"{length:.1f}" for length in place_w[:2])
         require(not rated.is_barred[0], f"the place ({where}) m is barred by keep_out; command another one")
         return region_pixels(place_w, shot)
