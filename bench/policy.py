@@ -20,7 +20,8 @@ from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.factory import get_policy_class
 
-from lerobot_excav.policies.mask_act.configuration_mask_act import TARGET_MASK_KEY, MaskACTConfig
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
+from lerobot_excav.policies.mask_act.mask_input import TARGET_MASK_KEY
 
 CAMERAS = ("observation.images.main", "observation.images.cab", TARGET_MASK_KEY)
 STATE_SIZE, ACTION_SIZE = 8, 4  # the excavator's; both cost next to nothing

@@ -88,7 +88,7 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data_shard": 4, "data": 4, "train": 6, "val": 4, "play_shard": 34, "test": 34, "checkpoint": 1}
+    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 40, "test": 40, "checkpoint": 1}
     stages |= {"report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
@@ -114,7 +114,7 @@ def played(plan, command, first, number):
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-@pytest.mark.parametrize(("name", "shards"), [("plan", (28, 4 * 34)), ("dig_plan", (21, 4 * 30))])
+@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 40)), ("dig_plan", (21, 4 * 30))])
 def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
     whole = request.getfixturevalue(name)
@@ -282,7 +282,10 @@ def test_the_landed_page_is_made_of_what_lies_beside_it():
     listed = set(ReportFolder(folder).own)
     assert listed == {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()} - {LIST}
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=folder / "metrics")
-    assert all(contents.metrics_paths(row) for row in contents.rows)
+    landed = {path for row in contents.rows for path in contents.metrics_paths(row).values()}
+    assert landed == set((folder / "metrics").glob("*.jsonl"))
+    rows = [json.loads(line) for line in (folder / "rows.jsonl").read_text().splitlines()]
+    assert {name for row in rows for name in row["origins"]} == {path.stem for path in landed}
     assert all(list(Path(curve.folder).glob("*.jsonl")) for curve in contents.curve)
 
 

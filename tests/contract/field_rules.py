@@ -210,12 +210,15 @@ POLICY = {
     "resize_to": optional(sizes(0, 2)),
     "augment_shift_px": whole(0, 1024),
     "augment_mask_px": whole(0, 1024),
+    "mask_shape": one_of("region", "box", "point"),
     "compare_masks": flag,
     "backtrack_frames": whole(0, 10_000),
     "backtrack_stride": whole(1, 100).beside(backtrack_frames=5),
     "mask_key": feature_name,
     "main_camera": optional(feature_name),
-    **dict.fromkeys(("withhold_mask", "target_token", "coordinate_channels", "optimizer_fused"), flag),
+    **dict.fromkeys(
+        ("withhold_mask", "withhold_pictures", "target_token", "coordinate_channels", "optimizer_fused"), flag
+    ),
 }
 
 TASK = {

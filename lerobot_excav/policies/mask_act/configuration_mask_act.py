@@ -18,18 +18,15 @@ from lerobot_excav.policies.mask_act.features import (
     check_features,
     check_normalization,
     require_mask_shape,
-    require_moved_mask,
     require_rgb,
+    require_shown_mask,
     require_way_back,
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
+from lerobot_excav.policies.mask_act.mask_input import MAIN_CAMERA_KEY, TARGET_MASK_KEY, MaskInput
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
 from lerobot_excav.setting import check_settings, setting
-
-TARGET_MASK_KEY = "observation.images.target_mask"
-MAIN_CAMERA_KEY = "observation.images.main"
-"""Camera that the mask belongs to where a policy has one of this name and none is chosen."""
 
 BACKBONES = ("resnet_small", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
 _UNDILATED = BACKBONES[:3]  # have no dilated last stage
@@ -45,7 +42,7 @@ def resolved[T](value: T | None) -> T:
 
 @PreTrainedConfig.register_subclass("mask_act")
 @dataclass
-class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
+class MaskACTConfig(MaskInput, ACTConfig):  # type: ignore[misc]  # LeRobot's classes are untyped here
     """Configure ACT with a target mask as the fourth channel of its main camera.
 
     Fields that ACT has keep ACT's meaning. A field whose default is None is filled by `preset` (or by the rule given
@@ -63,54 +60,6 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
     )
     preset_applied: str | None = setting(
         "The preset that has filled them; a checkpoint says it, nobody gives it", default=None, choices=tuple(PRESETS)
-    )
-
-    mask_key: str = setting(
-        "Image feature of the target mask, {0, 255}, of the size of the main camera", default=TARGET_MASK_KEY
-    )
-    main_camera: str | None = setting(
-        f"Image feature that the mask belongs to; left out: {MAIN_CAMERA_KEY}, or the only camera of the mask's size",
-        default=None,
-    )
-    withhold_mask: bool = setting("Silence every path of the mask: the no-condition variant", default=False)
-    target_token: bool = setting("Add one token pooled under the mask, placed to the pixel", default=False)
-    coordinate_channels: bool = setting(
-        "Show the backbone the row and column of every pixel as two more channels, so that the plain fourth channel "
-        "can tell where it lies",
-        default=False,
-    )
-    crop: list[int] | None = setting(
-        "Top, left, height and width of the part of the main picture and its mask that is used [px]; left out: all",
-        default=None,
-        low=0,
-        high=4096,
-    )
-    resize_to: list[int] | None = setting(
-        "Height and width to which all pictures and the mask are brought [px]; left out: they stay",
-        default=None,
-        low=0,
-        high=4096,
-    )
-    augment_shift_px: int = setting(
-        "In training, move the main picture and its mask together by up to this much along each axis, drawn for each "
-        "sample; other views stay [px]",
-        default=0,
-        low=0,
-        high=1024,
-        hint="0 leaves pictures where they are.",
-    )
-    augment_mask_px: int = setting(
-        "In training, move the mask alone by up to this much along each axis, drawn for each sample: the policy learns "
-        "to forgive masks that lie beside their target [px of the dataset's pictures]",
-        default=0,
-        low=0,
-        high=1024,
-        hint="0 leaves masks where they are.",
-    )
-    compare_masks: bool = setting(
-        "In training, compare masks with the stored frames; turn it off only if a processor of your own moves pictures "
-        "and masks together",
-        default=True,
     )
 
     chunk_size: int = setting("Actions of a plan [frames]", default=100, low=1, high=10_000)
@@ -355,7 +304,9 @@ class MaskACTConfig(ACTConfig):  # type: ignore[misc]  # LeRobot's classes are u
                 f"policy.{name}={value} would move {self.main_camera_key} of shape {main_shape} "
                 f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
             )
-        require_moved_mask(self.augment_mask_px, withheld=self.withhold_mask)
+        require_shown_mask(
+            augment_mask_px=self.augment_mask_px, mask_shape=self.mask_shape, withheld=self.withhold_mask
+        )
         require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:

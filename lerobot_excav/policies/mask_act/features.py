@@ -117,9 +117,10 @@ def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str
     )
 
 
-def require_moved_mask(augment_mask_px: int, *, withheld: bool) -> None:
-    """Raise `ConfigurationError` if a mask is to be moved in training that is withheld."""
-    require(
-        not (augment_mask_px and withheld),
-        f"policy.augment_mask_px={augment_mask_px} has no effect with policy.withhold_mask=true; leave it out",
-    )
+def require_shown_mask(*, augment_mask_px: int, mask_shape: str, withheld: bool) -> None:
+    """Raise `ConfigurationError` if a mask that is withheld is to be moved in training, or to have another shape."""
+    for field, value, usual in (("augment_mask_px", augment_mask_px, 0), ("mask_shape", mask_shape, "region")):
+        require(
+            not withheld or value == usual,
+            f"policy.{field}={value} has no effect with policy.withhold_mask=true; leave it out",
+        )

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import torch
 from torch import Tensor
 from torch.nn import functional
 
@@ -13,27 +12,27 @@ SMALLEST_PX = 16
 
 
 def framed(
-    views: Sequence[Tensor], mask: Tensor, *, main: int, crop: Sequence[int] | None, resize_to: Sequence[int] | None
+    pictures: Sequence[Tensor], mask: Tensor, *, main: int, crop: Sequence[int] | None, resize_to: Sequence[int] | None
 ) -> tuple[list[Tensor], Tensor]:
-    """Crop the main view, and bring all views and the mask to a size.
+    """Crop the main picture and its mask, and bring all pictures and the mask to a size.
 
     Pixels are averaged; a target is never lost, however small it becomes: a pixel is in the mask if the target covers
     more than half as much of it as of the pixel that it covers most.
 
     Args:
-        views: Four-channel views, each (B, 4, H, W); the fourth channel of the main one is the mask.
-        mask: Target mask, 0 or 1, (B, 1, H, W).
-        main: Which of the views is the main one.
-        crop: Top, left, height and width of the part of the main view that is used [px]; None is all of it.
+        pictures: RGB of each camera, (B, 3, H, W).
+        mask: Target mask of the main one, 0 or 1, (B, 1, H, W).
+        main: Index of the main picture.
+        crop: Top, left, height and width of the part of the main picture that is used [px]; None is all of it.
         resize_to: Height and width [px]; None leaves sizes as they are.
 
     Returns:
-        The views and the mask.
+        The pictures and the mask.
 
     Raises:
         ConfigurationError: Nothing of a target is left after the crop: the policy would act without one.
     """
-    new = list(views)
+    new = list(pictures)
     if crop is not None:
         top, left, height, width = crop
         part = slice(top, top + height), slice(left, left + width)
@@ -47,10 +46,7 @@ def framed(
     if resize_to is None:
         return new, mask
     size = (int(resize_to[0]), int(resize_to[1]))
-    mask = _resized_mask(mask, size)
-    rgb = [_resized(view[:, :3], size) for view in new]
-    fourth = [mask if number == main else torch.zeros_like(mask) for number in range(len(new))]
-    return [torch.cat(pair, dim=1) for pair in zip(rgb, fourth, strict=True)], mask
+    return [_resized(picture, size) for picture in new], _resized_mask(mask, size)
 
 
 def require_framing(

@@ -16,12 +16,13 @@ from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights,
 from lerobot_excav.policies.mask_act.command_changes import CommandChanges
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.framing import framed
+from lerobot_excav.policies.mask_act.mask_shape import shaped
 from lerobot_excav.policies.mask_act.mask_shift import shift_alone
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
 from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
 from lerobot_excav.policies.mask_act.training_masks import TrainingMasks, require_statistics
-from lerobot_excav.policies.mask_act.views import Batch, masked_views, target_mask
+from lerobot_excav.policies.mask_act.views import Batch, masked_views, pictures, target_mask
 from lerobot_excav.policies.mask_act.way_back import WayBack
 
 
@@ -200,15 +201,11 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
     def _run(self, batch: Batch, mask: Tensor, demonstration: Demonstration | None) -> tuple[Tensor, Latent | None]:
         config = self.config
-        views, mask = framed(
-            masked_views(config, batch, mask),
-            mask,
-            main=config.camera_keys.index(config.main_camera_key),
-            crop=config.crop,
-            resize_to=config.resize_to,
-        )
+        main = config.camera_keys.index(config.main_camera_key)
+        rgb, mask = framed(pictures(config, batch), mask, main=main, crop=config.crop, resize_to=config.resize_to)
+        mask = shaped(mask, config.mask_shape)
         plan: tuple[Tensor, Latent | None] = self.model(
-            views,
+            masked_views(rgb, mask, main),
             mask,
             state=batch[OBS_STATE] if self.config.robot_state_feature else None,
             env_state=batch[OBS_ENV_STATE] if self.config.env_state_feature else None,

@@ -1,5 +1,6 @@
 """Four-channel views: RGB of each camera, joined with the target mask or with zeros."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -52,11 +53,16 @@ def require_binary(mask_key: str, mask: Tensor) -> None:
     )
 
 
-def masked_views(config: MaskACTConfig, batch: Batch, mask: Tensor) -> list[Tensor]:
-    """Join the mask to the main camera and zeros to every other: (B, 4, H, W) for each of `config.camera_keys`."""
-    nothing = {key: torch.zeros_like(batch[key][:, :1]) for key in config.camera_keys}
-    fourth = nothing | {config.main_camera_key: mask}
-    return [torch.cat([batch[key], fourth[key]], dim=1) for key in config.camera_keys]
+def pictures(config: MaskACTConfig, batch: Batch) -> list[Tensor]:
+    """Return RGB, (B, 3, H, W), of each of `config.camera_keys`; black, on average, with `withhold_pictures`."""
+    given: list[Tensor] = [batch[key] for key in config.camera_keys]
+    return [torch.zeros_like(rgb) for rgb in given] if config.withhold_pictures else given
+
+
+def masked_views(rgb: Sequence[Tensor], mask: Tensor, main: int) -> list[Tensor]:
+    """Join the mask to the main picture, the one of this index, and zeros to every other: each (B, 4, H, W)."""
+    fourth = [mask if index == main else torch.zeros_like(picture[:, :1]) for index, picture in enumerate(rgb)]
+    return [torch.cat(pair, dim=1) for pair in zip(rgb, fourth, strict=True)]
 
 
 def require_cameras(config: MaskACTConfig, batch: Batch) -> None:

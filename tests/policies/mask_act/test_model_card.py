@@ -80,6 +80,12 @@ PLAIN = ["four-channel views; trained", "a fourth channel of the main camera. ",
         ({}, NETWORK + PLAIN),
         ({"target_token": True}, ["main camera and a token pooled under the mask. ", "| Target token | yes |"]),
         ({"withhold_mask": True}, ["(`withhold_mask`): the no-condition variant. Weights"]),
+        ({"mask_shape": "box", "target_token": True}, ["reads its bounding box as a fourth", "pooled under it. "]),
+        ({"mask_shape": "point"}, ["reads a point at its middle as a fourth"]),
+        (
+            {"withhold_pictures": True},
+            ["main camera. It never sees the colours of any camera (`withhold_pictures`). W"],
+        ),
         ({"coordinate_channels": True}, ["row and column of every pixel", "| Coordinate channels | yes |"]),
     ],
 )

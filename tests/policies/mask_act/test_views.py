@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from lerobot_excav.errors import ConfigurationError
-from lerobot_excav.policies.mask_act.views import masked_views, target_mask
+from lerobot_excav.policies.mask_act.views import masked_views, pictures, target_mask
 
 from .conftest import CAB, MAIN, MASK
 
@@ -21,7 +21,7 @@ def test_one_channel_bytes_and_booleans_are_the_same_mask(config, batch, convert
 def test_mask_joins_the_main_camera_and_zeros_the_others(config, batch):
     observation, settings = batch(), config(main_camera=CAB)
     mask = target_mask(settings, observation)
-    main, cab = masked_views(settings, observation, mask)
+    main, cab = masked_views(pictures(settings, observation), mask, main=settings.camera_keys.index(CAB))
     assert torch.equal(cab[:, 3:], mask)
     assert mask.any()
     assert not main[:, 3].any()
