@@ -22,7 +22,7 @@ from lerobot_excav.scripts.demos import ResumableArguments, played
 from lerobot_excav.setting import setting
 
 PICTURE_SETTINGS = (
-    *("mask_source", "mask_condition", "mask_noise", "mask_snap", "target_overlay"),
+    *("mask_source", "mask_condition", "mask_noise", "mask_dropout", "mask_snap", "target_overlay"),
     *("observation_height", "observation_width"),
 )
 

@@ -231,6 +231,7 @@ TASK = {
     "mask_condition": one_of("correct", "zero", "random", "mismatched"),
     "mask_noise": one_of("shift", "erode", "dilate", "flicker").beside(mask_noise_px=3),  # none has no size
     "mask_noise_px": whole(1, 1024).beside(mask_noise="shift"),
+    "mask_dropout": number(0, below=1),
     "mask_snap": flag,
     "target_overlay": flag,
 }

@@ -17,7 +17,8 @@ FRAMES = 12
 # What reports read of every task.
 METRICS = (
     *("simulation_version", "task", "scene_set", "scene_id", "stage", "target_id", "is_success", "frames"),
-    *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "mask_snap", "target_overlay", "shown_target_id"),
+    *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "mask_dropout", "mask_snap", "target_overlay"),
+    "shown_target_id",
     *("fps", "episode_length", "camera_every", "commands", "mask_missing", "mask_missing_frames", "mask_fallbacks"),
 )
 
@@ -182,9 +183,9 @@ def test_mask_noise_changes_the_mask_alone(gym_id, right, noise, growth):
     assert_only_mask_differs(shown, right)
 
 
-def flickering_masks(gym_id):
+def some_masks(gym_id, **settings):
     """Return the masks of some frames of the episode that `trace` plays."""
-    env = made(gym_id, mask_noise="flicker", mask_noise_px=3)
+    env = made(gym_id, **settings)
     masks = [observation["pixels/target_mask"] for observation, _ in play(env)]
     env.close()
     return masks
@@ -192,11 +193,21 @@ def flickering_masks(gym_id):
 
 @of_masks_and_scenes
 def test_a_mask_that_flickers_lies_elsewhere_at_every_frame_and_is_the_same_again(gym_id, trace):
-    masks, again = flickering_masks(gym_id), flickering_masks(gym_id)
+    masks, again = (some_masks(gym_id, mask_noise="flicker", mask_noise_px=3) for _ in range(2))
     assert all(map(np.array_equal, masks, again))
     assert len({mask.tobytes() for mask in masks}) > FRAMES // 2
     right = trace[0][0]["pixels/target_mask"]
     assert {int((mask > 0).sum()) for mask in masks} == {int((right > 0).sum())}
+
+
+@of_masks_and_scenes
+def test_a_mask_that_drops_out_is_whole_or_empty_and_the_same_again(gym_id, trace):
+    masks, again = (some_masks(gym_id, mask_dropout=0.5) for _ in range(2))
+    assert all(map(np.array_equal, masks, again))
+    right = trace[0][0]["pixels/target_mask"]
+    missing = [not mask.any() for mask in masks]
+    assert all(is_missing or np.array_equal(mask, right) for is_missing, mask in zip(missing, masks, strict=True))
+    assert 0 < sum(missing) < len(masks)
 
 
 @pytest.mark.parametrize(
@@ -206,6 +217,8 @@ def test_a_mask_that_flickers_lies_elsewhere_at_every_frame_and_is_the_same_agai
         ({"mask_noise_px": 2}, "mask_noise"),
         ({"mask_noise": "shift", "mask_noise_px": 2, "mask_condition": "zero"}, "mask_noise"),
         ({"mask_snap": True, "mask_condition": "zero"}, "mask_snap"),
+        ({"mask_dropout": 0.5, "mask_condition": "zero"}, "mask_dropout"),
+        ({"mask_dropout": 1.0}, "mask_dropout"),
         ({"mask_snap": True, "mask_condition": "random"}, "mask_snap"),
         ({"camera_every": 2, "obs_type": "agent_pos"}, "camera_every=2"),
         ({"camera_every": 2, "depth_info": True}, "camera_every=2"),

@@ -57,7 +57,13 @@ def test_another_target_changes_what_is_said_of_the_target_alone(task):
 
 
 @pytest.mark.parametrize(
-    "setting", [{"mask_condition": "zero"}, {"mask_noise": "shift", "mask_noise_px": 2}, {"target_overlay": True}]
+    "setting",
+    [
+        {"mask_condition": "zero"},
+        {"mask_noise": "shift", "mask_noise_px": 2},
+        {"target_overlay": True},
+        {"mask_dropout": 0.5},
+    ],
 )
 def test_a_mask_that_nobody_sees_cannot_be_corrupted(setting):
     with pytest.raises(ConfigurationError, match=rf"{next(iter(setting))}=.* has no effect with obs_type='state'"):

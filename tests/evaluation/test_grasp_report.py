@@ -79,6 +79,7 @@ def test_after_a_change_of_the_command_the_last_one_counts(make_run, grasp_line)
         ({"mask_condition": "mismatched", "target_overlay": True}, "mismatched, as overlay"),
         ({"mask_source": "detector"}, "correct, from detector"),
         ({"mask_noise": "shift", "mask_noise_px": 4, "mask_snap": True}, "correct, shift 4 px, snapped"),
+        ({"mask_dropout": 0.25}, "correct, dropout 25 %"),
         ({"camera_every": 5}, "correct, camera every 5 frames"),
         ({"commands": [[0, 0], [25, 3], [60, 1]]}, "correct, changed at frame 25 and 60"),
     ],

@@ -42,7 +42,7 @@ MOST_REST_FRAMES = 100_000
 
 MASK_WORDS = re.compile(
     rf"[^,]+(, ({'|'.join(MASK_CONDITIONS[1:])}))?(, ({'|'.join(MASK_NOISES[1:])}) [1-9][0-9]* px)?"
-    rf"(, {SNAPPED})?(, {OVERLAY})?"
+    rf"(, {SNAPPED})?(, dropout [0-9.e-]+ %)?(, {OVERLAY})?"
 )
 """What `TaskSettings.mask_words` can be; a source may be of a package that is not installed here."""
 
@@ -145,7 +145,7 @@ def _picture_of_mask_problems(episode: EpisodeTable, frame: int) -> Iterator[str
     if not np.isin(mask_img, (0, 255)).all():
         values = np.unique(mask_img)[:4].tolist()
         yield f"the target mask is not binary at frame {frame}: it holds {values}; allowed are 0 and 255"
-    elif not mask_img.any() and "zero" not in episode.mask_changes:
+    elif not mask_img.any() and "zero" not in episode.mask_changes and not _drops_out(episode):
         yield f"the target mask is empty from frame {frame} on"
 
 
@@ -154,15 +154,19 @@ def _flickers(episode: EpisodeTable) -> bool:
     return SNAPPED not in changes and any(change.startswith("flicker ") for change in changes)
 
 
+def _drops_out(episode: EpisodeTable) -> bool:
+    return any(change.startswith("dropout ") for change in episode.mask_changes)
+
+
 def mask_problems(episode: EpisodeTable) -> Iterator[str]:
     """Check the mask under each command: it is binary, marks something, and changes with the command and then only.
 
-    One that flickers changes at any frame. Its pictures can be decoded.
+    One that flickers or drops out changes at any frame. Its pictures can be decoded.
     """
     starts = [0, *(frame for frame, _ in episode.schedule)]
     digests, targets = episode.image_digests(MASK_KEY), episode.target_id
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
-        if len(set(digests[start:end])) != 1 and not _flickers(episode):
+        if len(set(digests[start:end])) != 1 and not (_flickers(episode) or _drops_out(episode)):
             yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
         is_other = start > 0 and targets[start] != targets[start - 1]
         if is_other and digests[start] == digests[start - 1] and not _corruptions(episode):

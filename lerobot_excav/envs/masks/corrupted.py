@@ -20,7 +20,7 @@ MASK_NOISES = ("none", "shift", "erode", "dilate", "flicker")
 (city-block distance); `dilate`: with those near it; `flicker`: as `shift`, in another direction at every frame."""
 
 _SHIFT_TRIES = 1000
-_STREAM, _FLICKER_STREAM = 0x3A5C, 0x3A5D  # name these families of random streams
+_STREAM, _FLICKER_STREAM, _DROPOUT_STREAM = 0x3A5C, 0x3A5D, 0x3A5E  # name these families of random streams
 
 
 class CorruptedSource:
@@ -31,11 +31,12 @@ class CorruptedSource:
         condition: One of `MASK_CONDITIONS`.
         noise: One of `MASK_NOISES`, added to what the condition shows.
         noise_px: Size of the noise [px].
+        dropout: Share of the frames at which an empty mask is shown, drawn for each frame by itself.
     """
 
-    def __init__(self, source: MaskSource, *, condition: str, noise: str, noise_px: int) -> None:
+    def __init__(self, source: MaskSource, *, condition: str, noise: str, noise_px: int, dropout: float = 0.0) -> None:
         self._source = source
-        self._condition, self._noise, self._noise_px = condition, noise, noise_px
+        self._condition, self._noise, self._noise_px, self._dropout = condition, noise, noise_px, dropout
 
     def mask(self, view: MaskView, command: Command) -> TargetMask | None:
         """Return the corrupted mask of a command.
@@ -54,12 +55,21 @@ class CorruptedSource:
         return replace(shown, pixels=pixels, parameters={**shown.parameters, **corruption}) if pixels.any() else None
 
     def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
-        """Return a mask of this source as it is shown at a frame: itself, unless it flickers."""
+        """Return a mask of this source as it is shown at a frame: itself, unless it flickers or drops out."""
+        return self.dropped(self.flickered(mask, view, command, frame), view, command, frame)
+
+    def flickered(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
+        """Return a mask of this source where it lies at a frame: on its place, unless it flickers."""
         if self._noise != "flicker" or not mask.pixels.any():
             return mask
-        key = (*view.scene_key, command.target_id, frame)
-        rng = np.random.default_rng(np.random.SeedSequence(_FLICKER_STREAM, spawn_key=key))
+        rng = _at_frame(_FLICKER_STREAM, view, command, frame)
         return replace(mask, pixels=noisy_pixels(mask.pixels, "shift", self._noise_px, rng))
+
+    def dropped(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
+        """Return a mask as it is, or an empty one at the frames at which it drops out."""
+        if not self._dropout or _at_frame(_DROPOUT_STREAM, view, command, frame).random() >= self._dropout:
+            return mask
+        return replace(mask, pixels=np.zeros_like(mask.pixels))
 
     def _under_condition(self, view: MaskView, command: Command, rng: np.random.Generator) -> TargetMask | None:
         if self._condition == "zero":
@@ -91,6 +101,12 @@ class CorruptedSource:
             f"return {size} of bool, the size of the main picture",
         )
         return mask if mask.pixels.any() else None
+
+
+def _at_frame(stream: int, view: MaskView, command: Command, frame: int) -> np.random.Generator:
+    """Return the generator of one frame of one command in one scene."""
+    key = (*view.scene_key, command.target_id, frame)
+    return np.random.default_rng(np.random.SeedSequence(stream, spawn_key=key))
 
 
 def moved_elsewhere(inside: Pixels, rng: np.random.Generator) -> Pixels:

@@ -69,8 +69,8 @@ class SnappedSource:
         shown = self._source.mask(view, command)
         if shown is None:
             return None
-        return self._snapper.snap(self._source.at_frame(shown, view, command, command.since_frame), view)
+        return self._snapper.snap(self._source.flickered(shown, view, command, command.since_frame), view)
 
     def at_frame(self, mask: TargetMask, view: MaskView, command: Command, frame: int) -> TargetMask:
-        """Return a mask of this source as it is shown at a frame: itself."""
-        return mask
+        """Return a mask of this source as it is shown at a frame: itself, unless it drops out."""
+        return self._source.dropped(mask, view, command, frame)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt, model_validator
 
 from lerobot_excav.envs.masks.corrupted import MASK_CONDITIONS, MASK_NOISES
-from lerobot_excav.envs.tasks.settings import FRAME_RATES, LAST_SCENE, SCENE_SETS, SNAPPED, TARGETS_PER_SCENE
+from lerobot_excav.envs.tasks.settings import (
+    FRAME_RATES,
+    LAST_SCENE,
+    SCENE_SETS,
+    SNAPPED,
+    TARGETS_PER_SCENE,
+    dropout_words,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,6 +28,7 @@ MASK_SETTINGS = {
     "mask_noise": "kinds of mask noise",
     "mask_noise_px": "strengths of mask noise",
     "mask_snap": "snapped masks and others",
+    "mask_dropout": "shares of missing masks",
 }
 """What says which mask was shown, with its plural for messages; every environment takes these as settings, and tells of
 its options the name of the file and a digest."""
@@ -83,6 +91,7 @@ class EpisodeRecord(BaseModel):
     mask_noise: Annotated[str, one_of(MASK_NOISES)]
     mask_noise_px: NonNegativeInt
     mask_snap: bool = False  # files of earlier releases do not say it, for nothing was snapped
+    mask_dropout: float = Field(default=0.0, ge=0.0, lt=1.0)  # nor this, for no mask dropped out
     target_overlay: bool
     shown_target_id: int = Field(ge=-1, lt=TARGETS_PER_SCENE)  # of the last mask, noise aside; -1 if it showed none
     is_success: bool  # every part of the task succeeded
@@ -127,6 +136,8 @@ class EpisodeRecord(BaseModel):
             words.append(f"{self.mask_noise} {self.mask_noise_px} px")
         if self.mask_snap:
             words.append(SNAPPED)
+        if self.mask_dropout:
+            words.append(dropout_words(self.mask_dropout))
         if self.target_overlay:
             words.append("as overlay")
         return ", ".join(words)

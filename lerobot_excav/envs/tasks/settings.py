@@ -21,6 +21,11 @@ SNAPPED = "snapped"
 _LEAST_IMAGE_PX, _MOST_IMAGE_PX = 32, 1024  # below, a target covers hardly a pixel
 
 
+def dropout_words(share: float) -> str:
+    """Say at how many frames a mask is missing."""
+    return f"dropout {100 * share:g} %"
+
+
 @dataclass(kw_only=True)
 class RenderSettings:
     """What `render()` of an environment returns: pictures for people, so LeRobot's videos of evaluations.
@@ -132,6 +137,13 @@ class TaskSettings:
     mask_condition: str = setting("What the target mask shows", default="correct", choices=MASK_CONDITIONS)
     mask_noise: str = setting("Error that is added to the mask", default="none", choices=MASK_NOISES)
     mask_noise_px: int = setting("Size of that error [px]", default=0, low=0, high=_MOST_IMAGE_PX)
+    mask_dropout: float = setting(
+        "Share of the frames at which the mask is missing, drawn for each: an empty one is shown, as by a segmenter "
+        "that loses its object for a moment",
+        default=0.0,
+        low=0.0,
+        below=1.0,
+    )
     mask_snap: bool = setting(
         "Whether a small network that looks at the picture marks the object under the middle of the mask, and that is "
         "shown in its place: mends masks that lie a little off their object",
@@ -165,6 +177,11 @@ class TaskSettings:
             self.mask_condition != "zero" or noise == "none",
             f"{prefix}mask_noise={noise!r} has no effect with {prefix}mask_condition='zero', which shows no "
             "mask; leave one of them out",
+        )
+        require(
+            self.mask_condition != "zero" or not self.mask_dropout,
+            f"{prefix}mask_dropout={self.mask_dropout} has no effect with {prefix}mask_condition='zero', which shows "
+            "no mask at any frame; leave one of them out",
         )
         require(
             self.mask_condition not in ("zero", "random") or not self.mask_snap,
@@ -201,11 +218,8 @@ class TaskSettings:
         Raises:
             ConfigurationError: `obs_type` is `state`, and one is not its default.
         """
-        names = (
-            ("mask_source", "mask_options", "mask_condition", "mask_noise", "mask_snap", "target_overlay")
-            if obs_type == "state"
-            else ()
-        )
+        masks = ("mask_source", "mask_options", "mask_condition", "mask_noise", "mask_dropout", "mask_snap")
+        names = (*masks, "target_overlay") if obs_type == "state" else ()
         for name in names:
             value, usual = getattr(self, name), getattr(TaskSettings, name)
             require(
@@ -223,7 +237,8 @@ class TaskSettings:
     def _mask_changes(self) -> tuple[str, ...]:
         condition = () if self.mask_condition == "correct" else (self.mask_condition,)
         noise = () if self.mask_noise == "none" else (f"{self.mask_noise} {self.mask_noise_px} px",)
-        return (*condition, *noise, *((SNAPPED,) if self.mask_snap else ()))
+        dropout = (dropout_words(self.mask_dropout),) if self.mask_dropout else ()
+        return (*condition, *noise, *((SNAPPED,) if self.mask_snap else ()), *dropout)
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:

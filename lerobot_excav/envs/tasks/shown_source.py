@@ -15,6 +15,10 @@ def shown_source(source: MaskSource, settings: TaskSettings, *, may_snap: bool =
     What a person has painted is shown as it is: `may_snap` is false.
     """
     corrupted = CorruptedSource(
-        source, condition=settings.mask_condition, noise=settings.mask_noise, noise_px=settings.mask_noise_px
+        source,
+        condition=settings.mask_condition,
+        noise=settings.mask_noise,
+        noise_px=settings.mask_noise_px,
+        dropout=settings.mask_dropout,
     )
     return SnappedSource(corrupted) if settings.mask_snap and may_snap else corrupted

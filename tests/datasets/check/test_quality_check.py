@@ -144,9 +144,11 @@ def test_an_empty_mask_is_found_unless_it_was_asked_for(tmp_path, monkeypatch, w
     assert problems(tmp_path / "d") == {0: "the target mask is empty from frame 0 on"}
 
 
-def test_masks_that_flicker_pass_where_the_dataset_says_so(tmp_path):
-    root = tmp_path / "flickers"
-    record_toy(root, scenes=1, targets=2, env={"mask_noise": "flicker", "mask_noise_px": 2})
+@pytest.mark.parametrize("env", [{"mask_noise": "flicker", "mask_noise_px": 2}, {"mask_dropout": 0.5}])
+def test_masks_that_flicker_or_drop_out_pass_where_the_dataset_says_so(tmp_path, env):
+    root = tmp_path / "unsteady"
+    record_toy(root, scenes=1, targets=2, env=env)
     assert problems(root, replays=2) == {}
-    masks = [frame[MASK].numpy().tobytes() for frame in load(root)]
-    assert len(set(masks)) > len(masks) // 2
+    masks = [frame[MASK].numpy() for frame in load(root)]
+    assert len({mask.tobytes() for mask in masks}) > (2 if "mask_dropout" in env else len(masks) // 2)
+    assert any(not mask.any() for mask in masks) == ("mask_dropout" in env)

@@ -1,3 +1,4 @@
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -200,6 +201,34 @@ def test_how_a_mask_flickers_depends_on_scene_target_and_frame():
     assert ways(2) == ways(2)
     for others in (ways(1), ways(2, scene_id=1), ways(2, frames=range(1, 11))):
         assert others != ways(2)
+
+
+def is_missing(frame, *, target_id=2, scene_id=0, **settings):
+    """Whether the mask is missing at a frame; it is whole otherwise."""
+    view = View(scene_id, ())
+    settings = {"condition": "correct", "noise": "none", "noise_px": 0, "dropout": 0.3, **settings}
+    source = CorruptedSource(OracleSource(), **settings)
+    mask = source.mask(view, command(target_id))
+    seen = source.at_frame(mask, view, command(target_id), frame)
+    assert seen.target_id == target_id
+    assert not seen.pixels.any() or np.array_equal(seen.pixels, mask.pixels) or settings["noise"] == "flicker"
+    return not seen.pixels.any()
+
+
+def test_a_mask_drops_out_at_its_share_of_the_frames_each_by_itself():
+    missing = [is_missing(frame) for frame in range(1000)]
+    assert abs(np.mean(missing) - 0.3) < 0.05  # more than three standard deviations
+    after = [is_now for was, is_now in itertools.pairwise(missing) if was]
+    assert abs(np.mean(after) - 0.3) < 0.09
+    assert missing[:20] == [is_missing(frame) for frame in range(20)]
+    for others in ({"target_id": 1}, {"scene_id": 1}):
+        assert missing[:40] != [is_missing(frame, **others) for frame in range(40)]
+
+
+def test_a_mask_that_flickers_drops_out_at_the_same_frames():
+    frames = range(40)
+    flickers = [is_missing(frame, noise="flicker", noise_px=3) for frame in frames]
+    assert flickers == [is_missing(frame) for frame in frames]
 
 
 @pytest.mark.parametrize("noise", [noise for noise in MASK_NOISES if noise not in ("none", "flicker")])

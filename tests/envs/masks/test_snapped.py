@@ -59,6 +59,19 @@ def test_a_flickering_mask_is_held_as_it_was_snapped():
     env.close()
 
 
+def test_a_snapped_mask_drops_out_and_comes_back_as_it_was():
+    env = FR5GraspEnv(scene_set="val", mask_dropout=0.5, mask_snap=True)
+    env.reset(seed=1)
+    shown = [env.mask.pixels]
+    for _ in range(12):
+        env.step(env.holding_action())
+        shown.append(env.mask.pixels)
+    env.close()
+    whole = [pixels for pixels in shown if pixels.any()]
+    assert 0 < len(whole) < len(shown)
+    assert all(np.array_equal(pixels, whole[0]) for pixels in whole)
+
+
 class Wrong:
     """A segmenter that marks a square, wherever it is asked."""
 
