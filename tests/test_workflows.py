@@ -88,7 +88,7 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 40, "test": 40, "checkpoint": 1}
+    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 45, "test": 45, "checkpoint": 1}
     stages |= {"report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
@@ -114,7 +114,7 @@ def played(plan, command, first, number):
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 40)), ("dig_plan", (21, 4 * 30))])
+@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 45)), ("dig_plan", (21, 4 * 30))])
 def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
     whole = request.getfixturevalue(name)
