@@ -20,6 +20,7 @@ METRICS = (
     *("mask_source", "mask_condition", "mask_noise", "mask_noise_px", "mask_dropout", "mask_snap", "target_overlay"),
     "shown_target_id",
     *("fps", "episode_length", "camera_every", "commands", "mask_missing", "mask_missing_frames", "mask_fallbacks"),
+    "mask_iou",
 )
 
 
@@ -208,6 +209,28 @@ def test_a_mask_that_drops_out_is_whole_or_empty_and_the_same_again(gym_id, trac
     missing = [not mask.any() for mask in masks]
     assert all(is_missing or np.array_equal(mask, right) for is_missing, mask in zip(missing, masks, strict=True))
     assert 0 < sum(missing) < len(masks)
+
+
+def overlap_of(gym_id, **settings):
+    """Return the overlap of mask and target that an episode of a few frames tells."""
+    env = made(gym_id, episode_length=FRAMES, **settings)
+    env.reset(seed=4)
+    is_over = False
+    while not is_over:
+        _, _, terminated, truncated, info = env.step(np.zeros(env.action_space.shape, np.float32))
+        is_over = terminated or truncated
+    env.close()
+    return info["episode_metrics"]["mask_iou"]
+
+
+@of_masks_and_scenes
+def test_metrics_tell_how_well_the_mask_fits_its_target(gym_id):
+    assert overlap_of(gym_id) == 1.0
+    assert 0.0 < overlap_of(gym_id, mask_noise="shift", mask_noise_px=2) < 1.0
+    assert overlap_of(gym_id, mask_condition="zero") == 0.0
+    assert overlap_of(gym_id, mask_condition="random") == 0.0
+    dropped = [not mask.any() for mask in some_masks(gym_id, mask_dropout=0.5)]
+    assert overlap_of(gym_id, mask_dropout=0.5) == pytest.approx(1.0 - np.mean(dropped))
 
 
 @pytest.mark.parametrize(

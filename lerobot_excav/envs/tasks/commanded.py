@@ -11,6 +11,7 @@ from lerobot_excav.envs.machines.pinhole import PinholeCamera
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.geometry import GeometrySource
+from lerobot_excav.envs.masks.overlap import MaskOverlap
 from lerobot_excav.envs.masks.pointed import PointedSource
 from lerobot_excav.envs.masks.shot import ENLARGED, Shot
 from lerobot_excav.envs.masks.source import MaskMissingError, Pixels, TargetMask, chooses_target
@@ -45,6 +46,7 @@ class CommandedEnv(WatchedEnv):
     _frame: int
     _missing_frames: int
     _mask_fallbacks: int  # how often a source that chooses has left the choice to the planner
+    _overlap: MaskOverlap  # of masks and targets
     _main_img: NDArray[np.uint8] | None
     _shot_renderer: Renderer | None = None
 
@@ -240,12 +242,15 @@ class CommandedEnv(WatchedEnv):
     def _ask(self, command: Command) -> TargetMask | None:
         """Ask the source for the mask of the newest command; where it chooses itself, the command's target moves."""
         mask = self._source.mask(self, command)
-        if mask is not None and mask.place_w is not None:
+        if mask is None:
+            return None
+        if mask.place_w is not None:
             self._move_target(command.target_id, mask.place_w)
             self._commands[-1] = replace(command, region=self._region(command.target_id))
             self._mask_fallbacks += "fallback" in mask.parameters
             is_moved = self.settings.mask_condition == "random"
-            return mask if is_moved else replace(mask, target_id=command.target_id)
+            mask = mask if is_moved else replace(mask, target_id=command.target_id)
+        self._overlap.begin(self.true_mask(self._commands[-1]))
         return mask
 
     def _change_command(self) -> None:

@@ -12,6 +12,7 @@ from lerobot_excav.envs.constants import TICKS_PER_SECOND
 from lerobot_excav.envs.machines.renderer import Renderer
 from lerobot_excav.envs.masks.command import Command
 from lerobot_excav.envs.masks.options import options_words
+from lerobot_excav.envs.masks.overlap import MaskOverlap
 from lerobot_excav.envs.masks.overlay import tinted
 from lerobot_excav.envs.masks.source import TargetMask, make_mask_source
 from lerobot_excav.envs.tasks.commanded import CommandedEnv
@@ -107,6 +108,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._selection: Selection | None = None
         self._commands: list[Command] = []
         self._mask: TargetMask | None = None
+        self._overlap = MaskOverlap()
         self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._main_img: NDArray[np.uint8] | None = None
 
@@ -193,6 +195,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         self._frame = self._missing_frames = self._mask_fallbacks = 0
         self._commands, self._main_img, self._is_over = [], None, False
         self._held.forget()
+        self._overlap.forget()
         try:
             self._give_command(selection.target_id)
             self._wait_for_mask()
@@ -238,7 +241,10 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         state = {"environment_state": self.environment_state} if self.obs_type == "state" else {}
         if not self._shows_pixels:
             return {"agent_pos": self.agent_pos, **state}
-        mask = None if self.mask is None else self.mask.pixels
+        shown = self.mask
+        mask = None if shown is None else shown.pixels
+        if mask is not None:
+            self._overlap.add(mask)
         pixels = self._held.shown(self._frame, mask, self._draw_all)
         return {"agent_pos": self.agent_pos, **state, "pixels": pixels}
 
@@ -285,6 +291,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
             "mask_missing": self.mask_missing,
             "mask_missing_frames": self._missing_frames,
             "mask_fallbacks": self._mask_fallbacks,
+            "mask_iou": self._overlap.mean,
             "is_success": self.is_success,
             "frames": self._frame,
             **self._measures(),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
 
+from lerobot_excav.evaluation.result_page.overlap_figure import ABOUT, ENTRY, has_imprecise_masks
 from lerobot_excav.evaluation.result_page.page import PageSection
 
 
@@ -37,7 +38,9 @@ def method_figures(section: PageSection) -> list[MethodFigure]:
     """Return the pictures of a section: none unless two rows of it have been run."""
     if len(section.rows) < 2:
         return []
-    figures = section.rows[0].run.measures.method_figures
+    figures = dict(section.rows[0].run.measures.method_figures)
+    if any(has_imprecise_masks(row.run.episodes) for row in section.rows):
+        figures[ABOUT] = ENTRY
     return [
         MethodFigure(
             name=f"{_slug(section.section.title)}_{_slug(about)}.png", about=about, entry=entry, section=section
