@@ -161,7 +161,7 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
         ({"mask_noise": "erode"}, "kinds of mask noise: erode and none"),
         ({"mask_noise_px": 2}, "strengths of mask noise: 0 and 2"),
         ({"mask_snap": True}, "snapped masks and others"),
-        ({"mask_dropout": 0.5}, "shares of missing masks: 0.0 and 0.5"),
+        ({"mask_dropout": 0.5}, "shares of frames at which masks drop out: 0.0 and 0.5"),
         ({"target_overlay": True}, "pictures with and without overlay"),
         ({"camera_every": 5}, "camera rates: 1 and 5"),
         ({"fps": 25}, "frame rates: 10 and 25"),

@@ -40,6 +40,8 @@ OUT_OF_RANGE = {
     "scene_set": ["", "tset", "TEST"],
     "stage": [-1, None, 1.0, "1"],
     "mask_condition": ["", "wrong"],
+    "mask_dropout": [-0.1, 1.0, None, "0.2", float("nan")],
+    "mask_iou": [-0.1, 1.1, "1", float("nan")],
     "mask_noise": ["blur"],
     "task": ["Dance-v0", ""],
     "shown_target_id": [-2, 4, None, 1.0, "1"],

@@ -1,7 +1,7 @@
 """Checks of one recorded episode that need no simulation."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -145,7 +145,7 @@ def _picture_of_mask_problems(episode: EpisodeTable, frame: int) -> Iterator[str
     if not np.isin(mask_img, (0, 255)).all():
         values = np.unique(mask_img)[:4].tolist()
         yield f"the target mask is not binary at frame {frame}: it holds {values}; allowed are 0 and 255"
-    elif not mask_img.any() and "zero" not in episode.mask_changes and not _drops_out(episode):
+    elif not mask_img.any() and "zero" not in episode.mask_changes:
         yield f"the target mask is empty from frame {frame} on"
 
 
@@ -154,24 +154,32 @@ def _flickers(episode: EpisodeTable) -> bool:
     return SNAPPED not in changes and any(change.startswith("flicker ") for change in changes)
 
 
-def _drops_out(episode: EpisodeTable) -> bool:
-    return any(change.startswith("dropout ") for change in episode.mask_changes)
+def _missing_masks(episode: EpisodeTable, digests: Sequence[bytes]) -> set[bytes]:
+    """Return the digests of empty masks where masks may drop out."""
+    if not any(change.startswith("dropout ") for change in episode.mask_changes):
+        return set()
+    first = {digest: frame for frame, digest in reversed([*enumerate(digests)])}
+    return {digest for digest, frame in first.items() if not episode.image(MASK_KEY, frame).any()}
 
 
 def mask_problems(episode: EpisodeTable) -> Iterator[str]:
     """Check the mask under each command: it is binary, marks something, and changes with the command and then only.
 
-    One that flickers or drops out changes at any frame. Its pictures can be decoded.
+    One that flickers changes at any frame, one that drops out is empty at any, but not at all. Its pictures can be
+    decoded.
     """
     starts = [0, *(frame for frame, _ in episode.schedule)]
     digests, targets = episode.image_digests(MASK_KEY), episode.target_id
+    missing = _missing_masks(episode, digests)
+    if missing and missing == set(digests):
+        yield "the target mask is empty in every frame"
     for start, end in zip(starts, [*starts[1:], episode.length], strict=True):
-        if len(set(digests[start:end])) != 1 and not (_flickers(episode) or _drops_out(episode)):
+        shown = {digest: frame for frame, digest in reversed([*enumerate(digests)][start:end]) if digest not in missing}
+        if len(shown) > 1 and not _flickers(episode):
             yield f"the target mask changes between frames {start} and {end - 1}, though the command does not"
         is_other = start > 0 and targets[start] != targets[start - 1]
         if is_other and digests[start] == digests[start - 1] and not _corruptions(episode):
             yield f"the command changes at frame {start}, though the target mask does not"
-        shown = {digest: frame for frame, digest in reversed([*enumerate(digests)][start:end])}
         for frame in sorted(shown.values()):
             yield from _picture_of_mask_problems(episode, frame)
 

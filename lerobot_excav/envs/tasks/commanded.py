@@ -350,6 +350,8 @@ class CommandedEnv(WatchedEnv):
             del self._commands[-2]
         self._begin_command(target_id)
         self._source, self._mask = source, mask
+        if mask is not None:
+            self._overlap.begin(self.true_mask(self.command))
         return self._observe(), self._info(is_over=False)
 
     @property

@@ -244,7 +244,7 @@ class MaskedTaskEnv[World, Picture: Renderer](CommandedEnv, gym.Env[dict[str, An
         shown = self.mask
         mask = None if shown is None else shown.pixels
         if mask is not None:
-            self._overlap.add(mask)
+            self._overlap.add(mask, self._frame)
         pixels = self._held.shown(self._frame, mask, self._draw_all)
         return {"agent_pos": self.agent_pos, **state, "pixels": pixels}
 

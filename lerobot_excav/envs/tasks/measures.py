@@ -28,7 +28,7 @@ MASK_SETTINGS = {
     "mask_noise": "kinds of mask noise",
     "mask_noise_px": "strengths of mask noise",
     "mask_snap": "snapped masks and others",
-    "mask_dropout": "shares of missing masks",
+    "mask_dropout": "shares of frames at which masks drop out",
 }
 """What says which mask was shown, with its plural for messages; every environment takes these as settings, and tells of
 its options the name of the file and a digest."""

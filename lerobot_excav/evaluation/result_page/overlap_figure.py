@@ -18,11 +18,21 @@ _EDGES = np.linspace(0.0, 1.0, 11)
 
 def has_imprecise_masks(episodes: Iterable[EpisodeRecord]) -> bool:
     """Whether some episodes have masks with an error, and their files say how well those fit."""
-    return any(error_words(episode) and episode.mask_iou is not None for episode in episodes)
+    return any(error_words(episode) and overlap(episode) is not None for episode in episodes)
+
+
+def overlap(episode: EpisodeRecord) -> float | None:
+    """Return how well the mask fitted its target; 0 if nothing was left of it, None if the file does not say it."""
+    return 0.0 if episode.mask_iou is None and episode.mask_missing else episode.mask_iou
 
 
 def error_words(episode: EpisodeRecord) -> str:
-    """Return the kinds of errors of an episode's mask, whatever their size; empty without one."""
+    """Return the kinds of errors of an episode's mask, whatever their size; empty without one.
+
+    Also empty where more than the error counts: the mask of something else, or a change of the command.
+    """
+    if episode.mask_condition != "correct" or episode.changes:
+        return ""
     words = [] if episode.mask_noise == "none" else [episode.mask_noise]
     words += ["dropout"] if episode.mask_dropout else []
     words += ["snapped"] if words and episode.mask_snap else []
@@ -31,7 +41,7 @@ def error_words(episode: EpisodeRecord) -> str:
 
 def success_by_overlap(episodes: Sequence[EpisodeRecord]) -> list[tuple[float, int, Interval]]:
     """Return, for every tenth of the overlap in which there are episodes, their mean overlap, number and success."""
-    known = [(episode.mask_iou, episode.is_success) for episode in episodes if episode.mask_iou is not None]
+    known = [(overlap(episode), episode.is_success) for episode in episodes if overlap(episode) is not None]
     overlaps, successes = np.array(known, dtype=float).reshape(-1, 2).T
     bins = np.clip(np.digitize(overlaps, _EDGES) - 1, 0, len(_EDGES) - 2)
     chosen = [bins == number for number in np.unique(bins)]
@@ -45,14 +55,15 @@ def draw_success_by_overlap(rows: Mapping[str, Sequence[EpisodeRecord]], path: P
     """Draw success with 95 % Wilson intervals against the overlap, a line for each kind of error, into a PNG file.
 
     Args:
-        rows: Episodes by the name of their row; those of one kind of error are taken together.
+        rows: Episodes by the name of their row; those of one kind of error are taken together, others left out.
         path: The file.
     """
     from matplotlib.figure import Figure
 
     kinds: dict[str, list[EpisodeRecord]] = {}
     for episode in (episode for episodes in rows.values() for episode in episodes):
-        kinds.setdefault(error_words(episode) or "no error", []).append(episode)
+        if words := error_words(episode):
+            kinds.setdefault(words, []).append(episode)
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, layout="constrained")
     axes = figure.subplots()
     for kind, episodes in kinds.items():

@@ -19,12 +19,13 @@ from lerobot_excav.policies.mask_act.features import (
     check_normalization,
     require_mask_shape,
     require_rgb,
-    require_shown_mask,
+    require_shown,
     require_way_back,
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
 from lerobot_excav.policies.mask_act.mask_input import MAIN_CAMERA_KEY, TARGET_MASK_KEY, MaskInput
+from lerobot_excav.policies.mask_act.mask_shape import MASK_SHAPES
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
 from lerobot_excav.setting import check_settings, setting
 
@@ -304,9 +305,11 @@ class MaskACTConfig(MaskInput, ACTConfig):  # type: ignore[misc]  # LeRobot's cl
                 f"policy.{name}={value} would move {self.main_camera_key} of shape {main_shape} "
                 f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
             )
-        require_shown_mask(
-            augment_mask_px=self.augment_mask_px, mask_shape=self.mask_shape, withheld=self.withhold_mask
-        )
+        if self.withhold_mask:
+            changes = {"augment_mask_px": (self.augment_mask_px, 0), "mask_shape": (self.mask_shape, MASK_SHAPES[0])}
+            require_shown(withheld="withhold_mask", **changes)
+        if self.withhold_pictures:
+            require_shown(withheld="withhold_pictures", augment_shift_px=(self.augment_shift_px, 0))
         require_framing(self.crop, self.resize_to, main_shape)
         mask = self.image_features.get(self.mask_key)
         if mask is not None:

@@ -117,10 +117,18 @@ def require_mask_shape(mask_key: str, mask_shape: tuple[int, ...], main_key: str
     )
 
 
-def require_shown_mask(*, augment_mask_px: int, mask_shape: str, withheld: bool) -> None:
-    """Raise `ConfigurationError` if a mask that is withheld is to be moved in training, or to have another shape."""
-    for field, value, usual in (("augment_mask_px", augment_mask_px, 0), ("mask_shape", mask_shape, "region")):
+def require_shown(*, withheld: str, **settings: tuple[Any, Any]) -> None:
+    """Check that nothing is asked of what is withheld.
+
+    Args:
+        withheld: The setting that withholds it.
+        settings: Settings that change it by their names: their value, and the one that changes nothing.
+
+    Raises:
+        ConfigurationError: One of them changes it.
+    """
+    for field, (value, neutral) in settings.items():
         require(
-            not withheld or value == usual,
-            f"policy.{field}={value} has no effect with policy.withhold_mask=true; leave it out",
+            value == neutral,
+            f"policy.{field}={value} has no effect with policy.{withheld}=true; give {neutral}, or leave it out",
         )

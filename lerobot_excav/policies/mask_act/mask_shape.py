@@ -37,10 +37,13 @@ def _between(marked: Tensor, dim: int) -> Tensor:
 
 
 def _around_mean(mask: Tensor, dim: int) -> Tensor:
-    """Mark the entries of an axis that are at most half a point from the mean of the mask's pixels."""
+    """Mark the entries of an axis that are at most half a point from the mean of the mask's pixels.
+
+    A mean between two entries goes to the higher one, so that a mask that moves by a pixel moves its point by a pixel.
+    """
     others = 5 - dim
     counts = mask.sum(dim=others, keepdim=True)  # mask pixels for each entry of the axis
     shape = [-1 if axis == dim else 1 for axis in range(4)]
     places = torch.arange(mask.shape[dim], dtype=mask.dtype, device=mask.device).reshape(shape)
     mean = (counts * places).sum(dim=dim, keepdim=True) / counts.sum(dim=dim, keepdim=True).clamp_min(1)
-    return ((places - mean.round()).abs() <= POINT_PX // 2).to(mask.dtype)
+    return ((places - (mean + 0.5).floor()).abs() <= POINT_PX // 2).to(mask.dtype)

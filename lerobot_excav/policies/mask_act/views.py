@@ -54,7 +54,7 @@ def require_binary(mask_key: str, mask: Tensor) -> None:
 
 
 def pictures(config: MaskACTConfig, batch: Batch) -> list[Tensor]:
-    """Return RGB, (B, 3, H, W), of each of `config.camera_keys`; black, on average, with `withhold_pictures`."""
+    """Return RGB, (B, 3, H, W), of each of `config.camera_keys`; the mean colour if `withhold_pictures`."""
     given: list[Tensor] = [batch[key] for key in config.camera_keys]
     return [torch.zeros_like(rgb) for rgb in given] if config.withhold_pictures else given
 

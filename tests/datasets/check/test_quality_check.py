@@ -144,6 +144,19 @@ def test_an_empty_mask_is_found_unless_it_was_asked_for(tmp_path, monkeypatch, w
     assert problems(tmp_path / "d") == {0: "the target mask is empty from frame 0 on"}
 
 
+@pytest.mark.parametrize(
+    ("env", "problem"),
+    [
+        ({"mask_noise": "flicker", "mask_noise_px": 2}, "the target mask changes between frames"),
+        ({"mask_condition": "zero"}, "the target mask is empty in every frame"),
+    ],
+)
+def test_a_mask_that_drops_out_is_the_same_otherwise_and_not_always_gone(tmp_path, monkeypatch, env, problem):
+    monkeypatch.setattr(toy_reach.spec.ReachSettings, "mask_words", "oracle, dropout 50 %")
+    record_toy(tmp_path / "d", scenes=1, targets=1, env=env)
+    assert problems(tmp_path / "d")[0].startswith(problem)
+
+
 @pytest.mark.parametrize("env", [{"mask_noise": "flicker", "mask_noise_px": 2}, {"mask_dropout": 0.5}])
 def test_masks_that_flicker_or_drop_out_pass_where_the_dataset_says_so(tmp_path, env):
     root = tmp_path / "unsteady"

@@ -18,8 +18,8 @@ def square(row):
 def overlap(target, *shown):
     one = MaskOverlap()
     one.begin(target)
-    for pixels in shown:
-        one.add(pixels)
+    for frame, pixels in enumerate(shown):
+        one.add(pixels, frame)
     return one.mean
 
 
@@ -37,21 +37,30 @@ def test_an_empty_mask_fits_nothing_and_frames_weigh_the_same():
 
 def test_without_a_frame_or_a_target_there_is_no_overlap():
     one = MaskOverlap()
-    one.add(square(0))
+    one.add(square(0), 0)
     assert one.mean is None
     one.begin(square(0))
-    one.add(square(0))
+    one.add(square(0), 0)
     assert one.mean == 1.0
     one.forget()
-    one.add(square(0))
+    one.add(square(0), 0)
     assert one.mean is None
 
 
 def test_a_new_target_counts_from_its_frame_on():
     one = MaskOverlap()
-    for target in (square(0), square(3)):
+    for frame, target in enumerate((square(0), square(3))):
         one.begin(target)
-        one.add(square(0))
+        one.add(square(0), frame)
+    assert one.mean == 0.5
+
+
+def test_a_frame_that_is_seen_again_counts_once_as_it_was_seen_last():
+    one = MaskOverlap()
+    one.begin(square(0))
+    one.add(square(0), 0)
+    for shown in (square(3), square(0), square(3)):
+        one.add(shown, 1)
     assert one.mean == 0.5
 
 

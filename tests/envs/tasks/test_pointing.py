@@ -49,6 +49,15 @@ def test_another_target_of_the_scene_is_commanded_from_the_next_action_on(env):
     assert (info["target_id"], info["command_frame"]) == (1, 1)
 
 
+def test_a_perfect_mask_fits_its_target_however_that_was_commanded(arm):
+    arm.reset(options={"scene_id": 2, "target_id": 0})
+    arm.step(arm.holding_action())
+    _, info = arm.recommand(1)
+    while "episode_metrics" not in info:
+        *_, info = arm.step(arm.holding_action())
+    assert info["episode_metrics"]["mask_iou"] == 1.0
+
+
 def test_what_is_commanded_before_the_first_action_is_the_first_command(env):
     env.reset(options={"scene_id": 2, "target_id": 0})
     env.recommand(1)

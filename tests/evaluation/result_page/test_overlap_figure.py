@@ -30,6 +30,8 @@ def episode(iou, *, is_success=True, number=0, **settings):
         ({"mask_dropout": 0.2}, "shift, dropout"),
         ({"mask_noise": "none", "mask_noise_px": 0, "mask_dropout": 0.2}, "dropout"),
         ({"mask_noise": "none", "mask_noise_px": 0, "mask_snap": True}, ""),
+        ({"mask_condition": "mismatched"}, ""),
+        ({"commands": [[0, 0], [50, 1]], "target_id": 0}, ""),
     ],
 )
 def test_errors_have_a_name_whatever_their_size(settings, words):
@@ -51,6 +53,11 @@ def test_success_is_counted_in_tenths_of_the_overlap():
     assert high[:2] == (pytest.approx(0.975), 2)
     assert high[2].estimate == 1.0
     assert success_by_overlap([episode(None)]) == []
+
+
+def test_an_episode_of_whose_mask_nothing_was_left_counts_as_no_overlap():
+    lost = episode(None, is_success=False, mask_missing=True)
+    assert [(x, number) for x, number, _ in success_by_overlap([lost, episode(0.9)])] == [(0.0, 1), (0.9, 1)]
 
 
 def test_a_picture_is_drawn_also_of_a_kind_without_overlaps(tmp_path):

@@ -1,4 +1,5 @@
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -33,7 +34,9 @@ def slow_point(mask):
     new = np.zeros_like(mask)
     if mask.any():
         rows, cols = np.nonzero(mask)
-        middle_row, middle_col = round(sum(rows.tolist()) / len(rows)), round(sum(cols.tolist()) / len(cols))
+        middle_row, middle_col = (
+            math.floor(Fraction(sum(each.tolist()), len(each)) + Fraction(1, 2)) for each in (rows, cols)
+        )
         for row in range(middle_row - 1, middle_row + 2):
             for col in range(middle_col - 1, middle_col + 2):
                 if 0 <= row < mask.shape[0] and 0 <= col < mask.shape[1]:
@@ -63,6 +66,13 @@ def test_a_point_inside_the_picture_stays(middle):
     mask = torch.zeros(1, 1, HEIGHT, WIDTH)
     mask[..., row - 1 : row + 2, col - 1 : col + 2] = 1.0
     assert torch.equal(shaped(mask, "point"), mask)
+
+
+@given(st.integers(0, 20), st.integers(1, 9))
+def test_a_mask_that_moves_by_a_pixel_moves_its_point_by_a_pixel(left, width):
+    mask = torch.zeros(1, 1, 12, 40)
+    mask[..., 4:7, 3 + left : 3 + left + width] = 1.0
+    assert torch.equal(shaped(mask.roll(1, dims=3), "point"), shaped(mask, "point").roll(1, dims=3))
 
 
 def ring(batch_size=3):
@@ -102,9 +112,28 @@ def test_a_shape_is_made_of_the_mask_at_the_size_that_the_network_sees(awake):
     assert views[:, 3].sum().item() == 3 * 9
 
 
+@pytest.mark.parametrize("settings", [{"mask_shape": "box"}, {"mask_shape": "point"}, {"withhold_pictures": True}])
+def test_a_training_step_sees_what_acting_sees(policy, settings):
+    agent, batch = policy(target_token=True, **settings), make_batch(actions=True)
+    loss, _ = agent.train().forward(batch)
+    loss.backward()
+    assert torch.isfinite(loss)
+    colours = stem(agent).weight.grad[:, :3]
+    assert bool(colours.any()) == ("withhold_pictures" not in settings)
+
+
 def test_a_shape_of_a_withheld_mask_is_refused(policy):
-    with pytest.raises(ConfigurationError, match=r"mask_shape=box has no effect with policy\.withhold_mask=true"):
+    with pytest.raises(
+        ConfigurationError, match=r"mask_shape=box has no effect with policy\.withhold_mask=true; give region"
+    ):
         policy(mask_shape="box", withhold_mask=True)
+
+
+def test_pictures_that_are_withheld_cannot_be_moved(policy):
+    with pytest.raises(
+        ConfigurationError, match=r"augment_shift_px=4 has no effect with policy\.withhold_pictures=true"
+    ):
+        policy(augment_shift_px=4, withhold_pictures=True)
 
 
 def test_a_policy_without_pictures_sees_no_colour_of_any_camera_and_the_whole_mask(awake):
