@@ -98,9 +98,8 @@ class EpisodeRecord(BaseModel):
     frames: NonNegativeInt
     mask_missing: bool  # the episode was given up because the source found nothing
     mask_missing_frames: NonNegativeInt  # in which the machine was held still, because the source had found nothing yet
-    mask_iou: float | None = Field(
-        default=None, ge=0.0, le=1.0
-    )  # of the mask as shown and the target; mean over frames
+    # Of the mask as shown and the target, mean over the frames; None without pictures and in files of earlier releases.
+    mask_iou: float | None = Field(default=None, ge=0.0, le=1.0)
     mask_fallbacks: NonNegativeInt = 0  # how often a source that chooses left it to the planner
     commands: tuple[CommandedTarget, ...]  # all, in their order; the first begins at frame 0
 
