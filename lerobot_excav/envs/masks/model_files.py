@@ -5,9 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from lerobot_excav.errors import ConfigurationError, require
+
+# Commits that `main` of the Hub had in 2026, so that a result can be repeated though a name stays and its files change.
+PINNED = {
+    "IDEA-Research/grounding-dino-tiny": "a2bb814dd30d776dcf7e30523b00659f4f141c71",
+    "facebook/sam2.1-hiera-tiny": "de431c4043854a71d8101e17995dfe596bf101a5",
+    "Qwen/Qwen2.5-VL-7B-Instruct": "cc594898137f460bfe9f0759e9844b3ce807cfb5",
+}
 
 
 class ModelName(BaseModel):
@@ -15,13 +22,13 @@ class ModelName(BaseModel):
 
     Attributes:
         name: Folder of the weights, or their name on the Hub.
-        revision: Commit of the Hub, so that a result can be repeated; a folder has none.
+        revision: Commit of the Hub, that of `PINNED` if left out, else `main`; a folder has none.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
-    revision: str | None = None
+    revision: str | None = Field(default_factory=lambda given: PINNED.get(given["name"]))
 
     @property
     def words(self) -> str:

@@ -1,6 +1,7 @@
 """Masks from words: the real classes of transformers with tiny random weights, and golden numbers made by hand."""
 
 import importlib.util
+import re
 import shutil
 import sys
 from types import SimpleNamespace
@@ -11,9 +12,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.envs.masks.grounding import Detection, Detector, clipped, phrase
-from lerobot_excav.envs.masks.model_files import ModelName, Placement
-from lerobot_excav.envs.masks.segment_anything import SegmentAnything
+from lerobot_excav.envs.masks.grounding import GROUNDING_DINO, Detection, Detector, clipped, phrase
+from lerobot_excav.envs.masks.model_files import ModelName, Placement, load
+from lerobot_excav.envs.masks.segment_anything import SAM2, SegmentAnything
+from lerobot_excav.envs.masks.vision_language import QWEN
 from lerobot_excav.envs.tasks.grasp.env import FR5GraspEnv
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
 from lerobot_excav.errors import ConfigurationError
@@ -239,6 +241,24 @@ def test_wrong_options_are_named(tmp_path, text, words):
 def test_provenance_names_a_folder_by_its_last_part_and_a_revision(weights):
     assert ModelName(name=str(weights / "dino")).words == "dino"
     assert ModelName(name="a/b", revision="abc").words == "a/b@abc"
+
+
+@pytest.mark.parametrize("default", [GROUNDING_DINO, SAM2, QWEN])
+def test_default_weights_are_of_one_commit_however_they_are_named(default):
+    assert re.fullmatch(r"[0-9a-f]{40}", default.revision)
+    assert ModelName.model_validate({"name": default.name}) == default
+    assert ModelName(name=default.name, revision="main").revision == "main"
+    assert ModelName(name=default.name + "-2").revision is None  # the commit of one repository means nothing in another
+
+
+def test_the_commit_reaches_the_loader():
+    asked = {}
+
+    def loader(name, **options):
+        asked.update(options, name=name)
+
+    load(loader, SAM2, download=True)
+    assert asked == {"name": SAM2.name, "revision": SAM2.revision, "local_files_only": False}
 
 
 def test_weights_of_another_model_are_refused(weights):
