@@ -13,7 +13,6 @@ from lerobot_excav.console.pilot import Actor, Pilot
 from lerobot_excav.console.recorder import Recorder
 from lerobot_excav.console.recording import Recording
 from lerobot_excav.console.wishes import grant, show_next
-from lerobot_excav.datasets.format import schema
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.registry import task_of_settings
@@ -97,21 +96,9 @@ def open_console(
 
 def _policy(checkpoint: Path, settings: TaskSettings) -> Actor:
     """Load a policy, and check that it is one for this machine; LeRobot is imported here alone: it takes seconds."""
-    from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config
+    from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config, require_same_machine
 
-    config = policy_config(checkpoint)
-    spec, (height, width) = task_of_settings(settings), settings.observation_size
-    sizes: dict[str, tuple[int, ...]] = {
-        schema.STATE_KEY: (len(spec.state_names),),
-        schema.ACTION_KEY: (len(spec.action_names),),
-    }
-    sizes |= {schema.camera_key(camera): (3, height, width) for camera in spec.cameras}
-    for key, feature in {**config.input_features, **config.output_features}.items():
-        require(
-            tuple(feature.shape) == sizes.get(key),
-            f"--policy={checkpoint} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} has "
-            f"{sizes.get(key, 'none')}; give a policy of this machine, or its --env.observation_height and _width",
-        )
+    require_same_machine(policy_config(checkpoint), settings)
     try:
         return PolicyActor(checkpoint)
     except OSError as error:

@@ -7,8 +7,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lerobot_excav.datasets.format import schema
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
-from lerobot_excav.errors import ConfigurationError
+from lerobot_excav.envs.tasks.registry import task_of_settings
+from lerobot_excav.envs.tasks.settings import TaskSettings
+from lerobot_excav.errors import ConfigurationError, require
 
 
 class Actor(Protocol):
@@ -105,6 +108,30 @@ def policy_config(checkpoint: Path, overrides: tuple[str, ...] = ()) -> Any:
         raise ConfigurationError(f"{checkpoint} cannot be used{wanted}: {' '.join(str(error).split())}") from error
     config.pretrained_path = checkpoint
     return config
+
+
+def require_same_machine(config: Any, settings: TaskSettings) -> None:
+    """Check that a policy reads and commands what a machine has, before its numbers meet in the middle of an episode.
+
+    Args:
+        config: Configuration of the policy.
+        settings: Those of the environment.
+
+    Raises:
+        ConfigurationError: The policy was trained for another machine, or for pictures of another size.
+    """
+    spec, (height, width) = task_of_settings(settings), settings.observation_size
+    sizes: dict[str, tuple[int, ...]] = {
+        schema.STATE_KEY: (len(spec.state_names),),
+        schema.ACTION_KEY: (len(spec.action_names),),
+    }
+    sizes |= {schema.camera_key(camera): (3, height, width) for camera in spec.cameras}
+    for key, feature in {**config.input_features, **config.output_features}.items():
+        require(
+            tuple(feature.shape) == sizes.get(key),
+            f"the policy {config.pretrained_path} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} "
+            f"has {sizes.get(key, 'none')}; give --env.type of its machine, or its --env.observation_height and _width",
+        )
 
 
 def policy_digest(checkpoint: Path) -> str:

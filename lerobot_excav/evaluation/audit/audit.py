@@ -12,7 +12,7 @@ from lerobot_excav.datasets.format.reading import reading
 from lerobot_excav.datasets.record.progress import EpisodeProgress
 from lerobot_excav.datasets.record.workers import episode_results, submit_episodes, worker_pool
 from lerobot_excav.errors import ConfigurationError
-from lerobot_excav.evaluation.audit.actor import policy_config
+from lerobot_excav.evaluation.audit.actor import policy_config, require_same_machine
 from lerobot_excav.evaluation.audit.branch import Branch
 from lerobot_excav.evaluation.audit.obedience import Obedience, obedience
 from lerobot_excav.evaluation.audit.scene_branches import audit_scene, read_scene
@@ -83,14 +83,14 @@ def play_audit(settings: AuditSettings, folder: Path, *, workers: int, show_prog
 
 
 def require_policies(settings: AuditSettings) -> None:
-    """Check that all policies are there, and can plan as asked for.
+    """Check that all policies are there, are of the machine, and can plan as asked for.
 
     Raises:
         ConfigurationError: One is not, or cannot.
     """
     for variant in settings.variants:
         if variant.checkpoint is not None:
-            policy_config(variant.checkpoint, variant.overrides)
+            require_same_machine(policy_config(variant.checkpoint, variant.overrides), settings.env)
 
 
 def read_audit(settings: AuditSettings, folder: Path, *, seed: int = 0) -> Audit:

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
+from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config, policy_digest
+from lerobot_excav.evaluation.audit.audit import play_audit
+from lerobot_excav.evaluation.audit.settings import AuditSettings, policy_variants
 
 CHECKPOINT = Path(__file__).parents[3] / "checkpoints" / "fr5_grasp_mask_act"
 FRAMES = 8
@@ -56,6 +59,22 @@ def test_what_is_no_policy_is_named(tmp_path):
 def test_a_setting_that_a_policy_cannot_have_is_an_error_of_ours(override):
     with pytest.raises(ConfigurationError):
         policy_config(CHECKPOINT, (override,))
+
+
+@pytest.mark.parametrize(
+    ("env_type", "settings", "words"),
+    [
+        ("excavator", {}, r"observation.state of shape \(7,\), and .*Scoop-v0 has \(8,\); give --env.type"),
+        ("fr5_grasp", {"observation_height": 48}, r"\(3, 96, 128\), and .* has \(3, 48, 128\)"),
+    ],
+)
+def test_a_policy_of_another_machine_or_picture_is_refused_before_all_else(tmp_path, env_type, settings, words):
+    env = env_types()[env_type].settings.of({**settings, "scene_set": "test"})
+    variants = policy_variants(CHECKPOINT, against=None, plans=(), ensemble=None)
+    audit = AuditSettings(env=env, first_scene=0, scenes=1, stage=0, variants=variants, seed=0)
+    with pytest.raises(ConfigurationError, match=words):
+        play_audit(audit, tmp_path / "scenes", workers=0, show_progress=False)
+    assert not (tmp_path / "scenes").exists()
 
 
 def test_a_digest_tells_policies_apart(tmp_path):

@@ -33,6 +33,7 @@ def policies(monkeypatch):
 
     monkeypatch.setattr(scene_branches, "_policy", load)
     monkeypatch.setattr(audit_module, "policy_config", lambda *_: None)
+    monkeypatch.setattr(audit_module, "require_same_machine", lambda *_: None)
     monkeypatch.setattr("toy_reach.env.FRAMES_ON_TARGET", 15)  # long enough for a mask that is given after arriving
     monkeypatch.setattr(scene_branches, "LEAD_S", 0.3)  # the disc arrives within a second
     return loaded
