@@ -129,7 +129,7 @@ def require_same_machine(config: Any, settings: TaskSettings) -> None:
     for key, feature in {**config.input_features, **config.output_features}.items():
         require(
             tuple(feature.shape) == sizes.get(key),
-            f"the policy {config.pretrained_path} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} "
+            f"{config.pretrained_path} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} "
             f"has {sizes.get(key, 'none')}; give --env.type of its machine, or its --env.observation_height and _width",
         )
 
