@@ -17,7 +17,7 @@ from lerobot.configs.train import TrainPipelineConfig
 from lerobot.scripts.lerobot_edit_dataset import EditDatasetConfig
 
 import lerobot_excav.plugin  # noqa: F401 - registers what the commands name
-from lerobot_excav.datasets.format.schema import excav_features
+from lerobot_excav.datasets.format.schema import COMMAND_KEY, excav_features
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
@@ -94,8 +94,8 @@ def test_every_stage_is_planned(plan):
 
 
 def test_every_stage_of_the_excavator_is_planned(dig_plan):
-    stages = {"data_shard": 3, "data": 3, "slim": 3, "train": 15, "checkpoint": 15, "operator": 2}
-    stages |= {"play_shard": 264, "play": 44, "audit": 1, "report": 1, "all": 1}
+    stages = {"data_shard": 4, "data": 4, "slim": 4, "train": 16, "checkpoint": 16, "operator": 2}
+    stages |= {"play_shard": 306, "play": 51, "audit": 1, "report": 1, "all": 1}
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
 
 
@@ -114,7 +114,7 @@ def played(plan, command, first, number):
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 45)), ("dig_plan", (21, 4 * 44))])
+@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 45)), ("dig_plan", (28, 4 * 51))])
 def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
     whole = request.getfixturevalue(name)
@@ -188,16 +188,17 @@ def test_what_has_landed_is_not_planned_again(tmp_path):
             (tmp_path / "page" / "metrics" / f"{task}_{policy}-{seed}.jsonl").touch()
     plan = dry_run(EXCAVATOR, tmp_path, "out=elsewhere", "results=page")
     assert {name: counts(plan)[name] for name in ("train", "checkpoint", "play")} == {
-        **{"train": 13, "checkpoint": 13, "play": 41},
+        **{"train": 14, "checkpoint": 14, "play": 48},
     }
 
 
 def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
     """But for their data, their masks and their seed."""
     own = ("--seed=", "--dataset.", "--output_dir=", "--policy.target_token=", "--policy.withhold_mask=")
+    own += ("--policy.augment_mask_px=",)  # of the training on changes of mind, which stands apart
     trainings = [words for words in commands(dig_plan) if words[0] == "lerobot-train" and "--steps=2000" in words]
     shared = {tuple(word for word in words if not word.startswith(own)) for words in trainings}
-    assert (len(trainings), len(shared)) == (15, 1)
+    assert (len(trainings), len(shared)) == (16, 1)
     recordings = [words for words in commands(dig_plan) if words[:2] == ["lerobot-excav", "demos"]]
     numbers = [dict(word.lstrip("-").split("=", 1) for word in words[2:]) for words in recordings]
     assert {int(options["scenes"]) * int(options["targets"]) for options in numbers} == {120}
@@ -205,9 +206,13 @@ def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
 
 
 def test_the_slim_copy_leaves_out_every_column_that_no_policy_reads(dig_plan):
-    slim = next(words for words in commands(dig_plan) if "--operation.type=remove_feature" in words)
-    (names,) = (word.partition("=")[2] for word in slim if word.startswith("--operation.feature_names="))
-    assert sorted(ast.literal_eval(names)) == sorted(excav_features(SCOOP))
+    """A policy reads where commands change, if they do."""
+    copies = [words for words in commands(dig_plan) if "--operation.type=remove_feature" in words]
+    assert len(copies) == 4
+    for words in copies:
+        options = dict(word.lstrip("-").split("=", 1) for word in words[1:])
+        read = {COMMAND_KEY} if options["repo_id"] == "local/excavator_changing" else set()
+        assert sorted(ast.literal_eval(options["operation.feature_names"])) == sorted(set(excav_features(SCOOP)) - read)
 
 
 @pytest.mark.slow
