@@ -56,7 +56,7 @@ def _row(label: str, verdict: str, found: Obedience) -> list[str]:
     return [
         *(label, verdict, str(found.branches)),
         *(_text(found.acted, 100.0), _text(found.success, 100.0)),
-        *(_text(found.slope, digits=2), _text(found.entry_error_m, digits=2)),
+        *(_text(found.slope, digits=2), _text(found.entry_error_m, digits=3)),
         *(_text(found.share, 100.0), _text(found.relative_share, 100.0)),
     ]
 
