@@ -241,6 +241,7 @@ NO_ZONES = ("", "0,0,1", "0,0,0,1", "0,1,1,0", "0,0,1,inf", "nan,0,1,1", "0,0,1,
 EXCAVATOR = {
     **TASK,
     **{"task": one_of("Scoop-v0", "Clear-v0"), "soil": SOIL, "fidelity": one_of("fast", "standard", "fine")},
+    **{"density": one_of("light", "usual", "heavy"), "pile": one_of("heaps", "two_heaps", "ridge")},
     "mask_snap": Rule(lambda v: v is False),  # there is nothing on the ground to snap to
     "keep_out": Rule(lambda v: isinstance(v, str) and v in ZONES, (*ZONES, *NO_ZONES)).beside(task="Clear-v0"),
     "retarget_frame": optional(whole(1, 199)),  # of 200 frames

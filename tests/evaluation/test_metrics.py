@@ -168,6 +168,8 @@ def test_seeds_of_a_run_must_show_the_same_scenes(make_run, scoop_line):
         ({"episode_length": 100}, "time limits: 100 and 200"),
         ({"soil": "gravel"}, "soils: gravel and sand"),
         ({"fidelity": "fine"}, "fidelities: fine and standard"),
+        ({"pile": "ridge"}, "shapes of piles: heaps and ridge"),
+        ({"density": "light"}, "densities: light and usual"),
         ({"simulation_version": 1}, "versions of the simulation: 1 and 5"),
     ],
 )

@@ -56,7 +56,10 @@ def test_the_seed_of_the_bootstrap_is_stated_and_has_an_effect(make_run, scoop_l
     assert "seed 5" in report_text(second)
 
 
-@pytest.mark.parametrize("changes", [{"soil": "gravel"}, {"fidelity": "fast"}, {"simulation_version": 1}])
+@pytest.mark.parametrize(
+    "changes",
+    [{"soil": "gravel"}, {"density": "heavy"}, {"pile": "ridge"}, {"fidelity": "fast"}, {"simulation_version": 1}],
+)
 def test_runs_whose_scenes_differ_stand_side_by_side_but_are_not_related(runs, make_run, scoop_line, changes):
     other = make_run("other", [scoop_line(i, **changes) for i in range(10)])
     with pytest.raises(DatasetError, match=r"half dug sand at standard fidelity in version 5 .* and other dug"):
@@ -73,6 +76,18 @@ def test_commands_may_change_at_other_frames_in_every_episode(make_run, grasp_li
     assert run.setting == {"table": "ice", "mask": "correct, changed at frame 10 (and 2 others)"}
     assert run.episodes[0].obeyed_shown_mask is None
     assert "3.0 [2.0, 4.0]" in report_text(make_report([run]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "sand"),
+        ({"density": "heavy"}, "heavy sand"),
+        ({"soil": "gravel", "pile": "two_heaps"}, "gravel, two heaps"),
+    ],
+)
+def test_a_row_tells_what_was_dug(make_run, scoop_line, changes, words):
+    assert make_run("a", [scoop_line(0, **changes)]).setting["soil"] == words
 
 
 def test_the_text_names_soil_fidelity_and_version(make_run, scoop_line):

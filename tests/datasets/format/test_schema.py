@@ -95,7 +95,7 @@ def test_policies_see_none_of_the_excav_columns(spec):
 
 
 def test_a_setting_is_a_column_where_its_task_has_it_alone():
-    settings = {"excav.soil", "excav.fidelity"}
+    settings = {"excav.soil", "excav.density", "excav.pile", "excav.fidelity"}
     assert settings <= excav_features(SCOOP).keys()
     assert not settings & excav_features(GRASP).keys()
 

@@ -58,11 +58,12 @@ def draw_pile(axes: Any, pile: ClearRecord) -> None:
 
 def _pile_is_known(pile: ClearRecord) -> bool:
     """Tell whether the pile as it was at first can be drawn: not after digging, of older scenes, or of other soils."""
-    return pile.stage == 0 and pile.simulation_version == SCOOP.simulation_version and pile.soil in PRESETS
+    is_known = pile.soil in PRESETS and pile.density == "usual"
+    return pile.stage == 0 and pile.simulation_version == SCOOP.simulation_version and is_known
 
 
 def _draw_pile_heights(axes: Any, pile: ClearRecord) -> None:
-    scene = draw_scene(pile.scene_set, pile.scene_id, soil=pile.soil)
+    scene = draw_scene(pile.scene_set, pile.scene_id, soil=pile.soil, pile=pile.pile)
     axes.contourf(*cell_centres_w(), scene.heights_m.T, levels=[*_LEVELS_M, 2.0], cmap="YlOrBr", alpha=0.35)
 
 

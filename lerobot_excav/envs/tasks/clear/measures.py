@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, NonNegative
 
 from lerobot_excav.envs.tasks.clear.cycle_record import DUMPED, ENDS, FAILURES, NO_FAILURE, TIMED_OUT
 from lerobot_excav.envs.tasks.clear.event_list import EVENTS
-from lerobot_excav.envs.tasks.measures import Column, EpisodeRecord, Kind, TargetId, TaskMeasures, one_of
+from lerobot_excav.envs.tasks.measures import Column, Kind, TargetId, TaskMeasures, one_of
+from lerobot_excav.envs.tasks.scoop.measures import DigRecord
 from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 
 if TYPE_CHECKING:
@@ -56,11 +57,9 @@ class ClearEvent(_Part):
     mass_kg: float
 
 
-class ClearRecord(EpisodeRecord):
+class ClearRecord(DigRecord):
     """Outcome of one pile."""
 
-    soil: str  # soil preset
-    fidelity: str  # numerical effort of the soil
     keep_out: str  # zones in which nothing may be dug
     pile_removed: float = Field(le=1.0)  # part of the pile that is gone from the dig area
     retained_mass_kg: float  # soil brought into the box, in all cycles [kg]
@@ -186,9 +185,15 @@ PERCENT = (0.0, 100.0)
 
 CLEAR_MEASURES = TaskMeasures(
     record=ClearRecord,
-    settings={"soil": "soils", "fidelity": "fidelities", "keep_out": "keep-out zones"},
+    settings={
+        "soil": "soils",
+        "density": "densities",
+        "pile": "shapes of piles",
+        "fidelity": "fidelities",
+        "keep_out": "keep-out zones",
+    },
     shared={},
-    setting={"soil": "soil", "mask": "mask"},
+    setting={"soil": "soil_words", "mask": "mask"},
     columns=(
         Column(
             key="pile_removed", header="pile removed [%]", kind=Kind.MEAN, field="pile_removed_percent", bounds=PERCENT
@@ -220,7 +225,7 @@ CLEAR_MEASURES = TaskMeasures(
     ),
     compared=("pile_removed", "success"),
     world="dug {soil} at {fidelity} fidelity within {episode_length} frames, with keep-out zones {keep_out!r}, in "
-    "version {simulation_version} of the simulation",
+    "version {simulation_version} of the simulation, {pile} of {density} density",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
     outcome=clear_outcome,

@@ -104,7 +104,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
     def _make_world(self) -> Worksite:
         rehearse()
         settings = self._excavator_settings
-        return Worksite(soil=settings.soil, fidelity=settings.fidelity)
+        return Worksite(soil=settings.dug_soil, fidelity=settings.fidelity)
 
     def _make_renderer(self, world: Worksite, height: int, width: int) -> WorksiteRenderer:
         return WorksiteRenderer(world, height=height, width=width)
@@ -137,7 +137,10 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
         """Return the scene as it is at the chosen stage."""
         settings = self._excavator_settings
         return draw_start(
-            *(settings.scene_set, selection.scene_id, selection.stage), soil=settings.soil, fidelity=settings.fidelity
+            *(settings.scene_set, selection.scene_id, selection.stage),
+            soil=settings.dug_soil,
+            pile=settings.pile,
+            fidelity=settings.fidelity,
         )
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:

@@ -12,11 +12,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class ScoopRecord(EpisodeRecord):
-    """Outcome of one dig-load-dump cycle."""
+class DigRecord(EpisodeRecord):
+    """Outcome of digging, whatever the task."""
 
     soil: str  # soil preset
+    density: str = "usual"  # of the soil; files of earlier releases do not say it
+    pile: str = "heaps"  # shape of the pile; nor this
     fidelity: str  # numerical effort of the soil
+
+    @property
+    def soil_words(self) -> str:
+        """What is dug, in words; that it is of the usual density, in heaps, goes without saying."""
+        density = "" if self.density == "usual" else f"{self.density} "
+        pile = "" if self.pile == "heaps" else f", {self.pile.replace('_', ' ')}"
+        return f"{density}{self.soil}{pile}"
+
+
+class ScoopRecord(DigRecord):
+    """Outcome of one dig-load-dump cycle."""
+
     target_success: bool  # whether loading began inside the commanded patch
     retained_mass_kg: float  # soil brought into the box [kg]
     residual_bucket_mass_kg: float  # soil left in the bucket [kg]
@@ -68,9 +82,9 @@ def _legend(operator: str | None) -> list[str]:
 
 SCOOP_MEASURES = TaskMeasures(
     record=ScoopRecord,
-    settings={"soil": "soils", "fidelity": "fidelities"},
+    settings={"soil": "soils", "density": "densities", "pile": "shapes of piles", "fidelity": "fidelities"},
     shared={"changes": "times at which the command changes"},
-    setting={"soil": "soil", "mask": "mask"},
+    setting={"soil": "soil_words", "mask": "mask"},
     columns=(
         Column(key="target_success", header="target success [%]", kind=Kind.RATE, field="target_success"),
         Column(key="full_success", header="full success [%]", kind=Kind.RATE, field="is_success"),
@@ -81,7 +95,8 @@ SCOOP_MEASURES = TaskMeasures(
         Column(key="spill", header="spill [%]", kind=Kind.RATE, field="has_spill"),
     ),
     compared=("target_success", "full_success", "retained_mass_kg"),
-    world="dug {soil} at {fidelity} fidelity in version {simulation_version} of the simulation",
+    world="dug {soil} at {fidelity} fidelity in version {simulation_version} of the simulation, {pile} of {density} "
+    "density",
     simulation="version {simulation_version}, {fidelity} fidelity of the soil",
     legend=_legend,
     outcome=scoop_outcome,

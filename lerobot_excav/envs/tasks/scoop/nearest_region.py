@@ -20,6 +20,11 @@ def swings_to_box_rad(scene: Scene) -> list[float]:
 def nearest_target(settings: TaskSettings, scene_id: int, stage: int) -> int:
     """Return the region with the shortest swing to the box, whatever its rank; 0 if the start has none."""
     excavator = cast(ExcavatorSettings, settings)
-    start = draw_start(settings.scene_set, scene_id, stage, soil=excavator.soil, fidelity=excavator.fidelity)
+    start = draw_start(
+        *(settings.scene_set, scene_id, stage),
+        soil=excavator.dug_soil,
+        pile=excavator.pile,
+        fidelity=excavator.fidelity,
+    )
     swings_rad = swings_to_box_rad(start)
     return int(np.argmin(swings_rad)) if swings_rad else 0

@@ -11,7 +11,7 @@ from lerobot_excav.envs.machines.excavator.kinematics import inverse
 from lerobot_excav.envs.machines.excavator.layout import DIG_AREA_EXTENT_M, SOIL_CELL_SIZE_M
 from lerobot_excav.envs.machines.excavator.worksite import WorksiteStart
 from lerobot_excav.envs.soil import PRESETS, SoilParameters
-from lerobot_excav.envs.tasks.scoop.pile import draw_pile
+from lerobot_excav.envs.tasks.scoop.pile import PILES, draw_pile
 from lerobot_excav.envs.tasks.scoop.targets import Target, TooFewTargetsError, find_targets
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
 from lerobot_excav.errors import ExcavError, require, require_choice
@@ -39,7 +39,7 @@ def cell_centres_w() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @lru_cache(maxsize=8)
-def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "sand") -> Scene:
+def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "sand", pile: str = "heaps") -> Scene:
     """Draw a scene; the same arguments give the same scene, byte for byte.
 
     Drawing takes most of a reset, and the targets of a scene are played one after the other: the last scenes are kept.
@@ -49,6 +49,7 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "s
         scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
         scene_id: Any integer from 0.
         soil: Name of the soil preset, or parameters, which set slope and density of the pile.
+        pile: Shape of the pile, one of `PILES`.
 
     Raises:
         ConfigurationError: An argument is not one of the allowed values.
@@ -56,11 +57,12 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "s
     require_choice("scene_set", scene_set, SCENE_SETS)
     if isinstance(soil, str):
         require_choice("soil", soil, tuple(PRESETS))
+    require_choice("pile", pile, tuple(PILES))
     require(scene_id >= 0, f"scene_id={scene_id} is negative; scenes are numbered from 0")
     # The set is part of the spawn key, so streams of two sets never coincide whatever the scene's number is.
     stream = np.random.SeedSequence(_STREAM, spawn_key=(SCENE_SETS.index(scene_set), scene_id))
     pile_rng, pose_rng, look_rng = (np.random.default_rng(s) for s in stream.spawn(3))
-    heights_m, targets = _draw_pile_with_targets(pile_rng, soil)
+    heights_m, targets = _draw_pile_with_targets(pile_rng, soil, pile)
     joint_pos = _draw_joint_pos(pose_rng)
     for array in (heights_m, joint_pos, *(target.center_w for target in targets)):
         array.flags.writeable = False
@@ -76,21 +78,21 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "s
 
 
 def _draw_pile_with_targets(
-    rng: np.random.Generator, soil: str | SoilParameters
+    rng: np.random.Generator, soil: str | SoilParameters, pile: str
 ) -> tuple[NDArray[np.float64], tuple[Target, ...]]:
     """Draw piles until one offers all its targets."""
     x_w, y_w = cell_centres_w()
     parameters = PRESETS[soil] if isinstance(soil, str) else soil
     for _ in range(_PILE_TRIES):
         heights_m = draw_pile(
-            rng, x_w=x_w, y_w=y_w, repose_tan=parameters.slope_tan, density_kg_m3=parameters.density_kg_m3
+            rng, pile=pile, x_w=x_w, y_w=y_w, repose_tan=parameters.slope_tan, density_kg_m3=parameters.density_kg_m3
         )
         try:
             return heights_m, find_targets(heights_m, x_w, y_w, rng)
         except TooFewTargetsError:
             continue
     raise ExcavError(
-        f"no pile of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; take a soil that "
+        f"no pile={pile!r} of soil={soil!r} with enough dig regions in {_PILE_TRIES} draws; take a soil that "
         "rests steeper, or report this scene if it is a preset"
     )
 

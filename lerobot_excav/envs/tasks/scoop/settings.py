@@ -1,6 +1,6 @@
 """The settings of the excavator's tasks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import lerobot_excav.envs.tasks.planner.vlm_source  # noqa: F401 - makes the source known
@@ -8,9 +8,13 @@ from lerobot_excav.envs.soil.fidelity import FIDELITIES
 from lerobot_excav.envs.soil.parameters import PRESETS, SoilParameters
 from lerobot_excav.envs.tasks.planner.zones import NO_ZONES, Zone, parsed_zones, zone_text
 from lerobot_excav.envs.tasks.retarget import RetargetSettings
+from lerobot_excav.envs.tasks.scoop.pile import PILES
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import require
 from lerobot_excav.setting import setting, with_default
+
+DENSITIES = {"light": 0.8, "usual": 1.0, "heavy": 1.2}
+"""Factor on the density of the soil (kind: design), which moist or packed sand differs by."""
 
 CYCLE_DURATION_S = 20.0
 """Time limit of a single cycle unless another is asked for [s] (kind: paper)."""
@@ -32,6 +36,20 @@ class ExcavatorSettings(RetargetSettings):
     fps: int = with_default(TaskSettings, "fps", 10)
     soil: str = setting(
         "Soil preset", default="sand", choices=tuple(PRESETS), also=SoilParameters, is_column=True, changes_start=True
+    )
+    density: str = setting(
+        "Density of the soil: as the preset has it, or 20 % less or more; a pile of the same mass is larger or smaller",
+        default="usual",
+        choices=tuple(DENSITIES),
+        is_column=True,
+        changes_start=True,
+    )
+    pile: str = setting(
+        "Shape of the pile: two to four heaps, as in all trained policies, two heaps that have met, or a ridge",
+        default="heaps",
+        choices=tuple(PILES),
+        is_column=True,
+        changes_start=True,
     )
     fidelity: str = setting(
         "Numerical effort of the soil", default="standard", choices=tuple(FIDELITIES), is_column=True
@@ -68,6 +86,15 @@ class ExcavatorSettings(RetargetSettings):
     def zones(self) -> tuple[Zone, ...]:
         """The keep-out zones."""
         return parsed_zones("keep_out", self.keep_out)
+
+    @property
+    def dug_soil(self) -> str | SoilParameters:
+        """The soil as it lies there: the preset or the parameters given, at the density asked for."""
+        factor = DENSITIES[self.density]
+        if factor == 1.0:
+            return self.soil
+        parameters = self.soil if isinstance(self.soil, SoilParameters) else PRESETS[self.soil]
+        return replace(parameters, density_kg_m3=factor * parameters.density_kg_m3)
 
     @property
     def soil_name(self) -> str:

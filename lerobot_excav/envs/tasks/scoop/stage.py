@@ -42,6 +42,7 @@ def draw_start(
     stage: int,
     *,
     soil: str | SoilParameters = "sand",
+    pile: str = "heaps",
     fidelity: str = "standard",
     propose: Propose = propose_regions,
 ) -> Scene:
@@ -53,15 +54,15 @@ def draw_start(
         ConfigurationError: An argument is not one of the allowed values.
     """
     if stage == 0:
-        return draw_scene(scene_set, scene_id, soil=soil)
-    return _later_start(scene_set, scene_id, stage, soil, fidelity, propose)
+        return draw_scene(scene_set, scene_id, soil=soil, pile=pile)
+    return _later_start(scene_set, scene_id, stage, soil, pile, fidelity, propose)
 
 
 @lru_cache(maxsize=64)
 def _later_start(
-    scene_set: str, scene_id: int, stage: int, soil: str | SoilParameters, fidelity: str, propose: Propose
+    scene_set: str, scene_id: int, stage: int, soil: str | SoilParameters, pile: str, fidelity: str, propose: Propose
 ) -> Scene:
-    before = draw_start(scene_set, scene_id, stage - 1, soil=soil, fidelity=fidelity, propose=propose)
+    before = draw_start(scene_set, scene_id, stage - 1, soil=soil, pile=pile, fidelity=fidelity, propose=propose)
     if not before.targets:  # nothing is left to be dug
         return before
     rehearse()

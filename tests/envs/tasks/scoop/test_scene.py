@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -6,18 +8,21 @@ from lerobot_excav.envs.machines.excavator.rendering import WorksiteRenderer
 from lerobot_excav.envs.machines.excavator.worksite import Worksite
 from lerobot_excav.envs.soil import PRESETS
 from lerobot_excav.envs.tasks.scoop.feasibility import LEAST_MASK_PX, RADIUS_RANGE_M
-from lerobot_excav.envs.tasks.scoop.pile import PILE_MASS_RANGE_KG
+from lerobot_excav.envs.tasks.scoop.pile import PILE_MASS_RANGE_KG, PILES
 from lerobot_excav.envs.tasks.scoop.scene import SOIL_CELL_SIZE_M, cell_centres_w, draw_scene
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.targets import LEAST_DISTANCE_M
 from lerobot_excav.envs.tasks.settings import SCENE_SETS, TARGETS_PER_SCENE
 from lerobot_excav.errors import ConfigurationError
 
 SCENES = [(scene_set, scene_id) for scene_set in SCENE_SETS for scene_id in range(4)]
+SHAPED = [("val", scene_id, pile) for pile in PILES for scene_id in range(2)]
 
 
-@pytest.fixture(scope="module", params=SCENES, ids=lambda p: f"{p[0]}-{p[1]}")
+@pytest.fixture(scope="module", params=[*SCENES, *SHAPED], ids=lambda p: "-".join(map(str, p)))
 def scene(request):
-    return draw_scene(*request.param)
+    scene_set, scene_id, *pile = request.param
+    return draw_scene(scene_set, scene_id, **({"pile": pile[0]} if pile else {}))
 
 
 def arrays_of(scene):
@@ -63,6 +68,36 @@ def test_targets_are_four_reachable_apart_and_on_the_soil(scene):
         assert target.center_w[2] == scene.heights_m[ix, iy] > 0.0
 
 
+def crest_spread_m(scene):
+    """Standard deviations along x and y of the places of the highest tenth of a pile [m]."""
+    x_w, y_w = cell_centres_w()
+    ix, iy = np.nonzero(scene.heights_m >= np.quantile(scene.heights_m[scene.heights_m > 0.0], 0.9))
+    return np.std(x_w[ix]), np.std(y_w[iy])
+
+
+def test_the_shape_of_a_pile_is_the_one_asked_for():
+    y_w = cell_centres_w()[1]
+    for scene_id in range(4):
+        heaps, two, ridge = (draw_scene("val", scene_id, pile=pile) for pile in PILES)
+        assert heaps.heights_m.tobytes() == draw_scene("val", scene_id).heights_m.tobytes()
+        across = two.heights_m.max(axis=0)  # a summit on either side of a saddle
+        middle = np.abs(y_w) < 0.5
+        summits = across[y_w < 0.0].max(), across[y_w > 0.0].max()
+        assert 0.1 < across[middle].min() < 0.7 * min(summits)
+        along = ridge.heights_m.max(axis=0)[np.abs(y_w) < 0.8]
+        assert along.min() > 0.8 * along.max()  # one crest, without a saddle
+        assert crest_spread_m(ridge)[1] > 1.5 * crest_spread_m(ridge)[0]
+
+
+@pytest.mark.parametrize(("density", "factor"), [("light", 0.8), ("usual", 1.0), ("heavy", 1.2)])
+def test_a_pile_of_heavier_soil_has_its_mass_in_less_room(density, factor):
+    settings = ExcavatorSettings(density=density, soil="gravel")
+    parameters = settings.dug_soil if density != "usual" else PRESETS[settings.dug_soil]
+    assert parameters == dataclasses.replace(PRESETS["gravel"], density_kg_m3=factor * PRESETS["gravel"].density_kg_m3)
+    volume_m3 = draw_scene("val", 2, soil=settings.dug_soil).heights_m.sum() * SOIL_CELL_SIZE_M**2
+    assert PILE_MASS_RANGE_KG[0] - 1 <= volume_m3 * factor * 1474.0 <= PILE_MASS_RANGE_KG[1] + 1
+
+
 @pytest.mark.parametrize("soil", ["sand", "gravel"])
 def test_every_target_has_a_mask_of_a_fair_number_of_pixels(soil):
     worksite = Worksite(soil=soil)
@@ -79,7 +114,12 @@ def test_every_target_has_a_mask_of_a_fair_number_of_pixels(soil):
 
 @pytest.mark.parametrize(
     ("changes", "named"),
-    [({"scene_set": "eval"}, "'train', 'val', 'test'"), ({"scene_id": -1}, "scene_id=-1"), ({"soil": "mud"}, "'sand'")],
+    [
+        ({"scene_set": "eval"}, "'train', 'val', 'test'"),
+        ({"scene_id": -1}, "scene_id=-1"),
+        ({"soil": "mud"}, "'sand'"),
+        ({"pile": "heap"}, "'two_heaps', 'ridge'"),
+    ],
 )
 def test_bad_arguments_name_the_field_and_what_is_allowed(changes, named):
     with pytest.raises(ConfigurationError, match=named):
