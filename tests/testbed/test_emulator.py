@@ -235,9 +235,9 @@ def test_sensors_are_noisy_as_asked_and_the_seed_decides():
 
 def test_the_next_scene_is_drawn_before_its_turn(monkeypatch):
     drawn = []
-    monkeypatch.setattr(emulated_site, "draw_scene", lambda *place, soil: drawn.append((*place, soil)))
-    with emulated({"scene_set": "val", "soil": "gravel"}):
-        until(lambda: drawn == [("val", 1, "gravel")])
+    monkeypatch.setattr(emulated_site, "draw_scene", lambda *place, soil, pile: drawn.append((*place, soil, pile)))
+    with emulated({"scene_set": "val", "soil": "gravel", "pile": "ridge"}):
+        until(lambda: drawn == [("val", 1, "gravel", "ridge")])
 
 
 def test_a_mask_that_flickers_lies_elsewhere_at_every_tick():
