@@ -21,6 +21,8 @@ def index_of(pairs: list[tuple[int, int]], **columns: object) -> pd.DataFrame:
             "scene_set": "train",
             "task": "Reach-v0",
             "keep_out": "none",
+            "density": "usual",
+            "pile": "heaps",
             "scene_id": scene,
             "stage": 0,
             "target_id": target,
