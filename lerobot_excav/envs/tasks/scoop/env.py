@@ -26,7 +26,7 @@ from lerobot_excav.envs.tasks.scoop.plan_view import draw_plan, height_colours
 from lerobot_excav.envs.tasks.scoop.region_pixels import region_pixels, require_pointable
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
-from lerobot_excav.envs.tasks.scoop.stage import draw_start
+from lerobot_excav.envs.tasks.scoop.stage import start_of
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.envs.tasks.selection import Selection, TargetAbsentError
 from lerobot_excav.errors import require
@@ -135,13 +135,7 @@ class ExcavatorEnv(MaskedTaskEnv[Worksite, WorksiteRenderer]):
 
     def _draw_start(self, selection: Selection) -> Scene:
         """Return the scene as it is at the chosen stage."""
-        settings = self._excavator_settings
-        return draw_start(
-            *(settings.scene_set, selection.scene_id, selection.stage),
-            soil=settings.dug_soil,
-            pile=settings.pile,
-            fidelity=settings.fidelity,
-        )
+        return start_of(self._excavator_settings, selection.scene_id, selection.stage)
 
     def _advance(self, action: NDArray[Any]) -> tuple[float, bool]:
         command, cycle = checked_action(action), self.cycle

@@ -7,7 +7,7 @@ import numpy as np
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_from_world
 from lerobot_excav.envs.tasks.scoop.scene import Scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
-from lerobot_excav.envs.tasks.scoop.stage import draw_start
+from lerobot_excav.envs.tasks.scoop.stage import start_of
 from lerobot_excav.envs.tasks.settings import TaskSettings
 
 
@@ -19,12 +19,5 @@ def swings_to_box_rad(scene: Scene) -> list[float]:
 
 def nearest_target(settings: TaskSettings, scene_id: int, stage: int) -> int:
     """Return the region with the shortest swing to the box, whatever its rank; 0 if the start has none."""
-    excavator = cast(ExcavatorSettings, settings)
-    start = draw_start(
-        *(settings.scene_set, scene_id, stage),
-        soil=excavator.dug_soil,
-        pile=excavator.pile,
-        fidelity=excavator.fidelity,
-    )
-    swings_rad = swings_to_box_rad(start)
+    swings_rad = swings_to_box_rad(start_of(cast(ExcavatorSettings, settings), scene_id, stage))
     return int(np.argmin(swings_rad)) if swings_rad else 0

@@ -22,6 +22,7 @@ from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.envs.tasks.scoop.operator.sight import CycleSight
 from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
 from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
@@ -56,6 +57,16 @@ def draw_start(
     if stage == 0:
         return draw_scene(scene_set, scene_id, soil=soil, pile=pile)
     return _later_start(scene_set, scene_id, stage, soil, pile, fidelity, propose)
+
+
+def start_of(settings: ExcavatorSettings, scene_id: int, stage: int) -> Scene:
+    """Return the start that settings, scene and stage determine; see `draw_start`."""
+    return draw_start(
+        *(settings.scene_set, scene_id, stage),
+        soil=settings.dug_soil,
+        pile=settings.pile,
+        fidelity=settings.fidelity,
+    )
 
 
 @lru_cache(maxsize=64)

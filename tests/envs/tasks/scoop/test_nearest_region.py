@@ -5,7 +5,7 @@ import pytest
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
 from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, world_from_cylinder
-from lerobot_excav.envs.tasks.scoop import nearest_region
+from lerobot_excav.envs.tasks.scoop import stage
 from lerobot_excav.envs.tasks.scoop.nearest_region import nearest_target, swings_to_box_rad
 from lerobot_excav.envs.tasks.scoop.scene import draw_scene
 from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
@@ -39,10 +39,10 @@ def test_it_is_the_shortest_swing_whatever_the_rank_of_the_region(monkeypatch):
         asked.append((start, options))
         return Start(-0.3, 0.2, 0.1, -0.1)
 
-    monkeypatch.setattr(nearest_region, "draw_start", drawn)
+    monkeypatch.setattr(stage, "draw_start", drawn)
     assert nearest_target(ExcavatorSettings(scene_set="val", soil="gravel", fidelity="fast"), 7, 3) == 1
-    assert asked == [(("val", 7, 3), {"soil": "gravel", "fidelity": "fast"})]
-    monkeypatch.setattr(nearest_region, "draw_start", lambda *_, **__: Start())
+    assert asked == [(("val", 7, 3), {"soil": "gravel", "pile": "heaps", "fidelity": "fast"})]
+    monkeypatch.setattr(stage, "draw_start", lambda *_, **__: Start())
     assert nearest_target(ExcavatorSettings(), 7, 3) == 0
 
 
