@@ -30,7 +30,7 @@ def starts():
 
 
 def test_stage_0_is_the_scene_itself():
-    assert start_at(0) is draw_scene(*SCENE, soil="sand")
+    assert start_at(0) is draw_scene(*SCENE, soil="sand", pile="heaps")
 
 
 @pytest.mark.slow
