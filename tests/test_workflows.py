@@ -155,6 +155,17 @@ def test_parts_of_another_policy_or_of_other_packages_are_not_put_together(tmp_p
     assert {path.stem for path in tmp_path.iterdir()} == {"a", "b"}
 
 
+def test_a_part_that_two_runs_have_played_at_once_is_not_put_into_a_row(tmp_path):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    parts = write_parts(tmp_path)
+    twice = [json.loads(text) for text in parts[1].read_text().splitlines() for _ in range(2)]
+    lines = [{**episode, "evaluation": "bc"[number % 2]} for number, episode in enumerate(twice)]
+    parts[1].write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(Exception, match="b.jsonl holds several evaluations"):
+        shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
+    assert not (tmp_path / "whole.jsonl").exists()
+
+
 def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):
     shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
     episodes = EPISODES

@@ -26,6 +26,21 @@ def keep_videos(out, name, number):
     return f" && rm -rf {folder} && mkdir -p {folder} && cp -r {out}/play/{name}/0-{number}/videos {folder}/"
 
 
+def lines_of_part(part):
+    """Return the episodes of a part of one evaluation.
+
+    Two runs of a workflow without a lock may play a part at the same time, into one file: a row would count its scenes
+    twice.
+
+    Raises:
+        WorkflowError: The part holds several evaluations.
+    """
+    lines = [json.loads(line) for line in Path(part).read_text(encoding="utf-8").splitlines()]
+    if len({line.get("evaluation") for line in lines}) > 1:
+        raise WorkflowError(f"{part} holds several evaluations, and one is allowed; remove it, to play it again")
+    return lines
+
+
 def merge_metrics(parts, whole):
     """Put metrics files together in their order, and say where the whole comes from.
 
@@ -34,10 +49,10 @@ def merge_metrics(parts, whole):
     other code, the commands say by which. The whole appears when all of it is written.
 
     Raises:
-        WorkflowError: Parts are of other policies, or were played with other versions of packages.
+        WorkflowError: Parts are of other policies, were played with other versions of packages, or one was played twice.
     """
     whole = Path(whole)
-    lines = [json.loads(line) for part in parts for line in Path(part).read_text(encoding="utf-8").splitlines()]
+    lines = [line for part in parts for line in lines_of_part(part)]
     first = {"evaluation": lines[0]["evaluation"]} if "evaluation" in lines[0] else {}
     origins = [json.loads(Path(part).with_suffix(".json").read_text(encoding="utf-8")) for part in parts]
     for name in ("policy", "packages"):
