@@ -8,9 +8,10 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.result_page.contents import CURVES
+from lerobot_excav.evaluation.result_page.kept_grid import SHOWN, VIDEO_GRID, is_poorer, kept_clips, shown_text
 from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import ResultPage
-from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, VIDEO_GRID, page_text
+from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, page_text
 from lerobot_excav.evaluation.result_page.plots import plot_curves
 from lerobot_excav.evaluation.result_page.video_grid import grid_rows, present_clips, write_grid
 from lerobot_excav.whole_file import write_whole
@@ -22,9 +23,10 @@ TEXTS = ("report.md", "report.json", "rows.jsonl")
 def write_page(page: ResultPage, folder: Path) -> list[Path]:
     """Write a page, its data, and the metrics that it is made of.
 
-    `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4`, and `metrics/LABEL.jsonl`
-    with `metrics/LABEL.json`, where it comes from. A page can be made again from these copies; those of an earlier page
-    are removed. A plot or video that could not be made again, because checkpoints or videos are gone, stays.
+    `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4` with
+    `rollouts.json`, what it shows, and `metrics/LABEL.jsonl` with `metrics/LABEL.json`, where it comes from. A page can be
+    made again from these copies; those of an earlier page are removed. A plot that could not be made again, because
+    checkpoints are gone, stays, and a video that shows more than could be shown now.
     Returns what was written, but for the copies.
 
     Raises:
@@ -34,9 +36,11 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     report.require_free(TEXTS)
     with report.staged() as stage:
         copies = _keep_metrics(page, stage / METRICS, folder / METRICS)
-        pictures = _pictures(page, stage)
+        kept, clips = kept_clips(report, page.contents), present_clips(page)
+        is_kept = is_poorer(clips, kept, page.contents)
+        pictures = [*_plots(page, stage), *([] if is_kept else _grid(page, stage))]
         beside = {*pictures, *({CURVE_PLOT, VIDEO_GRID} & set(report.own))}
-        text = page_text(page, files=beside, clips=present_clips(page) or None)
+        text = page_text(page, files=beside, clips=kept if is_kept or not clips else clips)
         rows = "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows)
         for name, content in zip(TEXTS, (text, json.dumps(page.as_dict(), indent=1) + "\n", rows), strict=True):
             write_whole(stage / name, content)
@@ -60,14 +64,19 @@ def _keep_metrics(page: ResultPage, stage: Path, folder: Path) -> set[str]:
     return {f"{METRICS}/{name}.{suffix}" for name, *_ in kept for suffix in ("jsonl", "json")}
 
 
-def _pictures(page: ResultPage, folder: Path) -> list[str]:
-    clips = grid_rows(page)
+def _plots(page: ResultPage, folder: Path) -> list[str]:
     if page.curves:
         plot_curves(page.curves, folder / CURVE_PLOT)
-    if clips:
-        write_grid(folder / VIDEO_GRID, clips)
     figures = [figure for section in page.sections for figure in method_figures(section)]
     for figure in figures:
         figure.draw(folder / figure.name)
-    shown = [name for name, made in ((CURVE_PLOT, page.curves), (VIDEO_GRID, clips)) if made]
-    return [*shown, *(figure.name for figure in figures)]
+    return [*([CURVE_PLOT] if page.curves else []), *(figure.name for figure in figures)]
+
+
+def _grid(page: ResultPage, folder: Path) -> list[str]:
+    rows = grid_rows(page)
+    if not rows:
+        return []
+    write_grid(folder / VIDEO_GRID, rows)
+    write_whole(folder / SHOWN, shown_text(present_clips(page)))
+    return [VIDEO_GRID, SHOWN]

@@ -15,12 +15,12 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_text import simulations
 from lerobot_excav.evaluation.result_page.contents import Clips
+from lerobot_excav.evaluation.result_page.kept_grid import VIDEO_GRID
 from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import PageRow, PageSection, ResultPage
 from lerobot_excav.evaluation.training import TrainingFacts
 
 CURVE_PLOT = "success.png"
-VIDEO_GRID = "rollouts.mp4"
 
 _TRAINING = ("training", "data", "demonstrations", "steps", "batch", "samples", "minutes", "seed", "commit")
 _POINT = ("policy", "played with", "step", "minutes", "n", "success [%]")

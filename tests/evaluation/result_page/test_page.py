@@ -84,6 +84,38 @@ def test_a_missing_video_leaves_a_tile_out(finished, tmp_path):
     assert "- `paired`, episodes 1\n" in (tmp_path / "results" / "report.md").read_text()
 
 
+def test_a_grid_that_shows_more_than_could_be_shown_now_stays_and_the_page_names_what_it_shows(finished, out, tmp_path):
+    film, text = (out / "rollouts.mp4").read_bytes(), (out / "report.md").read_text()
+    (clips,) = finished.clips
+    more = finished.model_copy(update={"clips": (clips, clips.model_copy(update={"label": "zero"}))})
+    (tmp_path / "test/paired/videos/fr5_grasp_0/eval_episode_0.mp4").unlink()
+    for missing in ("eval_episode_1.mp4", None):
+        write_page(make_page(more), out)
+        assert (out / "rollouts.mp4").read_bytes() == film
+        assert (out / "report.md").read_text() == text
+        if missing:
+            (tmp_path / "test/paired/videos/fr5_grasp_0" / missing).unlink()
+
+
+def test_a_grid_is_made_again_when_the_contents_name_other_episodes(finished, out, tmp_path):
+    (tmp_path / "test/paired/videos/fr5_grasp_0/eval_episode_0.mp4").unlink()
+    (clips,) = finished.clips
+    write_page(make_page(finished.model_copy(update={"clips": (clips.model_copy(update={"episodes": (1,)}),)})), out)
+    assert "- `paired`, episodes 1\n" in (out / "report.md").read_text()
+    assert json.loads((out / "rollouts.json").read_text()) == {"clips": [{"label": "paired", "episodes": [1]}]}
+
+
+def test_a_grid_of_version_0_2_0_is_taken_to_show_what_the_contents_name(finished, out, tmp_path):
+    listed = json.loads((out / "report_files.json").read_text())
+    del listed["files"]["rollouts.json"]
+    (out / "report_files.json").write_text(json.dumps(listed))
+    (out / "rollouts.json").unlink()
+    text = (out / "report.md").read_text()
+    shutil.rmtree(tmp_path / "test/paired/videos")
+    write_page(make_page(finished), out)
+    assert (out / "report.md").read_text() == text
+
+
 def test_videos_may_lie_elsewhere_by_the_name_of_their_evaluation(finished, tmp_path):
     shutil.move(tmp_path / "test/paired/videos", tmp_path / "films/paired/videos")
     assert not video_grid.grid_rows(make_page(finished))
