@@ -161,7 +161,7 @@ def test_a_part_that_two_runs_have_played_at_once_is_not_put_into_a_row(tmp_path
     twice = [json.loads(text) for text in parts[1].read_text().splitlines() for _ in range(2)]
     lines = [{**episode, "evaluation": "bc"[number % 2]} for number, episode in enumerate(twice)]
     parts[1].write_text("".join(json.dumps(line) + "\n" for line in lines))
-    with pytest.raises(Exception, match="b.jsonl holds several evaluations"):
+    with pytest.raises(Exception, match=r"b\.jsonl holds several evaluations"):
         shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
     assert not (tmp_path / "whole.jsonl").exists()
 

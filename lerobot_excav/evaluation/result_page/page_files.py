@@ -24,8 +24,8 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     """Write a page, its data, and the metrics that it is made of.
 
     `report.md`, `report.json`, `rows.jsonl` (one row each), `success.png`, `rollouts.mp4` with
-    `rollouts.json`, what it shows, and `metrics/LABEL.jsonl` with `metrics/LABEL.json`, where it comes from. A page can be
-    made again from these copies; those of an earlier page are removed. A plot that could not be made again, because
+    `rollouts.json`, what it shows, and `metrics/LABEL.jsonl` with `metrics/LABEL.json`, where it comes from. A page can
+    be made again from these copies; those of an earlier page are removed. A plot that could not be made again, because
     checkpoints are gone, stays, and a video that shows more than could be shown now.
     Returns what was written, but for the copies.
 
