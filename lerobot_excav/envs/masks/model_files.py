@@ -28,7 +28,7 @@ class ModelName(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
-    revision: str | None = Field(default_factory=lambda given: PINNED.get(given["name"]))
+    revision: str | None = Field(default_factory=lambda given: PINNED.get(given.get("name")))
 
     @property
     def words(self) -> str:
@@ -78,13 +78,14 @@ def load(kind: Callable[..., Any], model: ModelName, *, download: bool, **option
         ConfigurationError: The weights are not here and may not be fetched, or are damaged.
     """
     revision = {} if Path(model.name).is_dir() else {"revision": model.revision}
+    at = f" at commit {model.revision}" if revision.get("revision") else ""
     try:
         return kind(model.name, local_files_only=not download, **revision, **options)
     except Exception as error:  # transformers and safetensors raise a dozen kinds over files that are damaged
         where = os.environ.get("HF_HOME", "~/.cache/huggingface")
         raise ConfigurationError(
-            f"the weights {model.name!r} cannot be loaded: {' '.join(str(error).split())[:300]}. Give a folder that "
-            f"holds them, or set download = true in mask_options; what was fetched before lies in {where}"
+            f"the weights {model.name!r}{at} cannot be loaded: {' '.join(str(error).split())[:300]}. Give a folder "
+            f"that holds them, or set download = true in mask_options; what was fetched before lies in {where}"
         ) from error
 
 

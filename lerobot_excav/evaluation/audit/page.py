@@ -28,6 +28,7 @@ def audit_text(audit: Audit) -> str:
         task=audit.settings.task_spec.id,
         scene_set=audit.settings.env.scene_set,
         scenes=len(audit.settings.scene_ids),
+        played=audit.settings.played_words,
         sentence=f"Verdict: **{verdict.verdict}**; {verdict.reason}.",
         header=HEADER,
         rows=[_row(label, audit.verdicts[label].verdict, found) for label, found in audit.obedience.items()],

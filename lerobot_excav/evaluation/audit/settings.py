@@ -92,6 +92,15 @@ class AuditSettings:
         """The scenes."""
         return range(self.first_scene, self.first_scene + self.scenes)
 
+    @property
+    def played_words(self) -> str:
+        """How the scenes are played, in words: from which stage, and with what but the defaults of the environment."""
+        defaults, given = type(self.env)(), self.env.as_dict()
+        told = {name for name, value in given.items() if value != getattr(defaults, name)} - {"scene_set"}
+        options = [f"--env.{name}={given[name]}" for name in given if name in told]
+        other = f"with {' '.join(options)}" if options else "with the defaults of the environment"
+        return f"{other}, from stage {self.stage}" if self.stage else other
+
     def as_record(self) -> dict[str, Any]:
         """Return the settings as plain data, but for how many scenes: an audit may be made longer."""
         return {

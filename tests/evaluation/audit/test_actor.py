@@ -1,6 +1,7 @@
 """Policies act in an audit as `lerobot-eval` lets them, planning as asked for."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from lerobot_excav.envs.tasks.grasp.spec import GRASP
 from lerobot_excav.envs.tasks.registry import env_types
 from lerobot_excav.errors import ConfigurationError
-from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config, policy_digest
+from lerobot_excav.evaluation.audit.actor import PolicyActor, policy_config, policy_digest, require_same_machine
 from lerobot_excav.evaluation.audit.audit import play_audit
 from lerobot_excav.evaluation.audit.settings import AuditSettings, policy_variants
 
@@ -75,6 +76,45 @@ def test_a_policy_of_another_machine_or_picture_is_refused_before_all_else(tmp_p
     with pytest.raises(ConfigurationError, match=words):
         play_audit(audit, tmp_path / "scenes", workers=0, show_progress=False)
     assert not (tmp_path / "scenes").exists()
+
+
+CAMERAS = dict.fromkeys(("main", "cab", "target_mask"), (3, 96, 128))
+
+
+def policy_of(cameras=CAMERAS, state=8, **settings):
+    """Return the configuration of a policy of the excavator, as far as it is compared with a machine."""
+    feature = lambda *shape: SimpleNamespace(shape=shape)  # noqa: E731
+    inputs = {f"observation.images.{name}": feature(*shape) for name, shape in cameras.items()}
+    inputs["observation.state"] = feature(state)
+    outputs = {"action": feature(4)}
+    return SimpleNamespace(pretrained_path="policy", input_features=inputs, output_features=outputs, **settings)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        policy_of(),
+        policy_of(cameras={**CAMERAS, "empty_camera_0": (3, 480, 640)}),
+        policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_to=(96, 128)),
+        SimpleNamespace(pretrained_path="policy", input_features=None, output_features=None),
+    ],
+    ids=["as it is", "a camera that the policy fills itself", "pictures that the policy resizes", "nothing declared"],
+)
+def test_a_policy_that_can_work_on_a_machine_is_let_through(config):
+    require_same_machine(config, env_types()["excavator"].settings.of({}))
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        (policy_of(cameras={**CAMERAS, "wrist": (3, 96, 128)}, resize_to=(96, 128)), "wrist .* has none"),
+        (policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_to=None), r"cab of shape \(3, 48, 64\)"),
+        (policy_of(state=7, resize_to=(96, 128)), r"state of shape \(7,\)"),
+    ],
+)
+def test_a_policy_that_cannot_work_on_a_machine_is_refused_though_it_resizes_pictures(config, words):
+    with pytest.raises(ConfigurationError, match=words):
+        require_same_machine(config, env_types()["excavator"].settings.of({}))
 
 
 def test_a_digest_tells_policies_apart(tmp_path):

@@ -236,3 +236,11 @@ def test_the_text_is_the_page_without_its_pictures(tmp_path):
     text = audit_text(audit)
     assert "Verdict: **insensitive**; the slope of" in text
     assert "](audit_" not in text
+    played = "with --env.observation_height=32 --env.observation_width=48"
+    assert f"5 scenes of the set test, {played}, each" in " ".join(text.split())
+
+
+def test_the_page_says_what_was_dug_from_which_stage():
+    env = env_types()["excavator"].settings.of({"scene_set": "val", "pile": "ridge", "density": "light"})
+    audit = AuditSettings(env=env, first_scene=0, scenes=1, stage=3, variants=(), seed=0)
+    assert audit.played_words == "with --env.density=light --env.pile=ridge, from stage 3"

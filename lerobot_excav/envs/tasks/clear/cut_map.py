@@ -11,6 +11,7 @@ from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_fr
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord
 from lerobot_excav.envs.tasks.scoop.scene import cell_centres_w, draw_scene
+from lerobot_excav.envs.tasks.scoop.settings import soil_at_density
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
@@ -29,13 +30,13 @@ def draw_cut_map(piles: Sequence[ClearRecord], path: Path) -> None:
     piles = piles[:MOST_PILES]
     figure = Figure(figsize=(_PANEL_IN[0] * len(piles), _PANEL_IN[1]), dpi=110, layout="constrained")
     for axes, pile in zip(np.atleast_1d(figure.subplots(1, len(piles))), piles, strict=True):
-        draw_pile(axes, pile)
+        draw_cuts(axes, pile)
     key = "Squares: commanded regions, green where digging began inside;\ndots: where it began"
     figure.suptitle(key + of, fontsize=9)
     figure.savefig(path, metadata={"Software": None})
 
 
-def draw_pile(axes: Any, pile: ClearRecord) -> None:
+def draw_cuts(axes: Any, pile: ClearRecord) -> None:
     """Draw the cycles of an episode, seen from above, on matplotlib's `axes`."""
     if _pile_is_known(pile):
         _draw_pile_heights(axes, pile)
@@ -52,18 +53,19 @@ def draw_pile(axes: Any, pile: ClearRecord) -> None:
             axes.plot(*ends[0], marker="o", markersize=3.5, color=colour)
     removed = f"{100.0 * pile.pile_removed:.0f} % removed in {pile.cycle_count} cycles"
     stage = f", stage {pile.stage}" if pile.stage else ""
-    axes.set_title(f"{pile.scene_set} scene {pile.scene_id}{stage}: {removed}", fontsize=9)
+    dug = "" if pile.soil_words == "sand" else f", {pile.soil_words}"
+    axes.set_title(f"{pile.scene_set} scene {pile.scene_id}{stage}{dug}: {removed}", fontsize=9)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(-5.5, 3.2), ylim=(-3.2, 6.2))
 
 
 def _pile_is_known(pile: ClearRecord) -> bool:
-    """Tell whether the pile as it was at first can be drawn: not after digging, of older scenes, or of other soils."""
-    is_known = pile.soil in PRESETS and pile.density == "usual"
-    return pile.stage == 0 and pile.simulation_version == SCOOP.simulation_version and is_known
+    """Tell whether the pile can be drawn as it was at first: not after digging, of older scenes, or of own soils."""
+    return pile.stage == 0 and pile.simulation_version == SCOOP.simulation_version and pile.soil in PRESETS
 
 
 def _draw_pile_heights(axes: Any, pile: ClearRecord) -> None:
-    scene = draw_scene(pile.scene_set, pile.scene_id, soil=pile.soil, pile=pile.pile)
+    soil = soil_at_density(pile.soil, pile.density)
+    scene = draw_scene(pile.scene_set, pile.scene_id, soil=soil, pile=pile.pile)
     axes.contourf(*cell_centres_w(), scene.heights_m.T, levels=[*_LEVELS_M, 2.0], cmap="YlOrBr", alpha=0.35)
 
 

@@ -3,12 +3,12 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.tasks.clear.cut_map import draw_pile
+from lerobot_excav.envs.tasks.clear.cut_map import draw_cuts
 from lerobot_excav.envs.tasks.clear.cycle_record import FAILURES, NO_FAILURE
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord
 from lerobot_excav.envs.tasks.clear.spec import CYCLES
@@ -80,18 +80,23 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
 
     Of a method with several trainings the first one is shown.
     """
-    shared = set.intersection(*({pile.key for pile in piles} for piles in methods.values()))
+    shared = set.intersection(*({_at_first(pile) for pile in piles} for piles in methods.values()))
     figure = _figure(4.2 * len(methods), 4.6)
     if not shared:
         figure.text(0.5, 0.5, "No pile was cleared by all of them.", ha="center")
     else:
         panels = figure.subplots(1, len(methods), squeeze=False)[0]
         for axes, (name, piles) in zip(panels, methods.items(), strict=True):
-            first, *others = [pile for pile in piles if pile.key == min(shared)]
-            draw_pile(axes, first)
+            first, *others = [pile for pile in piles if _at_first(pile) == min(shared)]
+            draw_cuts(axes, first)
             which = f", first of {1 + len(others)} trainings" if others else ""
             axes.set_title(f"{name}{which}\n{axes.get_title()}", fontsize=8)
     _save(figure, path)
+
+
+def _at_first(pile: ClearRecord) -> tuple[Any, ...]:
+    """Return what determines a pile as it was at first."""
+    return (*pile.key, pile.simulation_version, pile.soil, pile.density, pile.pile, pile.fidelity)
 
 
 def _save(figure: "Figure", path: Path) -> None:

@@ -90,13 +90,18 @@ class ExcavatorSettings(RetargetSettings):
     @property
     def dug_soil(self) -> str | SoilParameters:
         """The soil as it lies there: the preset or the parameters given, at the density asked for."""
-        factor = DENSITIES[self.density]
-        if factor == 1.0:
-            return self.soil
-        parameters = self.soil if isinstance(self.soil, SoilParameters) else PRESETS[self.soil]
-        return replace(parameters, density_kg_m3=factor * parameters.density_kg_m3)
+        return soil_at_density(self.soil, self.density)
 
     @property
     def soil_name(self) -> str:
         """Name of the soil preset; `custom` for parameters of one's own."""
         return "custom" if isinstance(self.soil, SoilParameters) else self.soil
+
+
+def soil_at_density(soil: str | SoilParameters, density: str) -> str | SoilParameters:
+    """Return a soil, a preset or parameters, at one of the `DENSITIES`."""
+    factor = DENSITIES[density]
+    if factor == 1.0:
+        return soil
+    parameters = soil if isinstance(soil, SoilParameters) else PRESETS[soil]
+    return replace(parameters, density_kg_m3=factor * parameters.density_kg_m3)

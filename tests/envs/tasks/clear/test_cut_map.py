@@ -1,10 +1,13 @@
 import json
+from itertools import combinations
 from pathlib import Path
 
 import pytest
+from matplotlib.contour import QuadContourSet
+from matplotlib.figure import Figure
 from PIL import Image
 
-from lerobot_excav.envs.tasks.clear.cut_map import MOST_PILES, draw_cut_map
+from lerobot_excav.envs.tasks.clear.cut_map import MOST_PILES, draw_cut_map, draw_cuts
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord, clear_sentence
 from lerobot_excav.scripts.main import main
 
@@ -64,11 +67,26 @@ def test_figures_of_one_name_are_kept_apart_and_old_ones_go(tmp_path):
     assert {path.name for path in out.glob("*.png")} == {"figure_c.png"}
 
 
-def test_piles_of_a_soil_of_ones_own_or_of_an_older_simulation_are_drawn_without_their_heights(tmp_path):
-    pile = piles(1)[0]
-    pictures = []
-    for changes in ({}, {"soil": "custom"}, {"simulation_version": 1}, {"stage": 2}):
-        draw_cut_map([pile.model_copy(update=changes)], tmp_path / "map.png")
-        pictures.append((tmp_path / "map.png").read_bytes())
-    assert pictures[1] == pictures[2] != pictures[0]
-    assert pictures[3] != pictures[2]  # the title names the stage
+def drawn(**changes):
+    """Return the title of a pile's cuts, and the outlines of its heights; none where the pile is not known."""
+    axes = Figure().subplots()
+    draw_cuts(axes, piles(1)[0].model_copy(update=changes))
+    heights = [child for child in axes.get_children() if isinstance(child, QuadContourSet)]
+    return axes.get_title(), [path.vertices.tolist() for contours in heights for path in contours.get_paths()]
+
+
+def test_the_heights_of_a_pile_are_those_of_its_soil_its_density_and_its_shape():
+    outlines = [drawn(**changes)[1] for changes in ({}, {"soil": "gravel"}, {"density": "light"}, {"pile": "ridge"})]
+    assert all(outlines)
+    assert all(one != other for one, other in combinations(outlines, 2))
+
+
+@pytest.mark.parametrize("changes", [{"soil": "custom"}, {"simulation_version": 1}, {"stage": 2}])
+def test_piles_of_a_soil_of_ones_own_of_an_older_simulation_or_a_later_stage_are_drawn_without_heights(changes):
+    assert not drawn(**changes)[1]
+
+
+def test_the_title_says_what_was_dug_unless_it_is_sand_in_heaps():
+    assert drawn()[0].startswith("val scene 0: ")
+    assert drawn(density="light", pile="ridge")[0].startswith("val scene 0, light sand, ridge: ")
+    assert drawn(stage=2)[0].startswith("val scene 0, stage 2: ")

@@ -48,6 +48,9 @@ def test_pictures_are_drawn_of_one_method_and_of_several(piles, tmp_path, draw):
         assert Image.open(tmp_path / "figure.png").width > 300
 
 
-def test_methods_without_a_common_pile_are_said_to_have_none(piles, tmp_path):
-    method_figures.draw_same_pile({"a": piles[:1], "b": piles[1:]}, tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").stat().st_size > 1_000
+@pytest.mark.parametrize("changes", [{"scene_id": 7}, {"pile": "ridge"}, {"density": "light"}, {"soil": "gravel"}])
+def test_methods_without_a_common_pile_are_said_to_have_none(piles, tmp_path, changes):
+    other = piles[0].model_copy(update=changes)
+    method_figures.draw_same_pile({"a": piles[:1], "b": [other]}, tmp_path / "figure.png")
+    method_figures.draw_same_pile({"a": piles[:1], "b": piles[1:]}, tmp_path / "none.png")
+    assert (tmp_path / "figure.png").read_bytes() == (tmp_path / "none.png").read_bytes()

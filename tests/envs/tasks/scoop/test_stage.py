@@ -8,7 +8,8 @@ from lerobot_excav.envs.tasks.planner.full_view import propose_regions
 from lerobot_excav.envs.tasks.scoop import stage
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.envs.tasks.scoop.scene import draw_scene
-from lerobot_excav.envs.tasks.scoop.stage import dig_cycle, draw_start, operator_rng, settle
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
+from lerobot_excav.envs.tasks.scoop.stage import dig_cycle, draw_start, operator_rng, settle, start_of
 
 SCENE = ("val", 3)
 ARRAYS = ("joint_pos", "heights_m", "firm_heights_m", "box_heights_m")
@@ -31,6 +32,20 @@ def starts():
 
 def test_stage_0_is_the_scene_itself():
     assert start_at(0) is draw_scene(*SCENE, soil="sand", pile="heaps")
+
+
+@pytest.mark.parametrize("given", [{"soil": "gravel"}, {"density": "heavy"}, {"pile": "ridge"}, {"scene_set": "val"}])
+def test_a_start_is_of_the_scene_set_the_soil_the_density_and_the_pile_of_the_settings(given):
+    usual, asked = (start_of(ExcavatorSettings.of(settings), 1, 0) for settings in ({}, given))
+    assert not np.array_equal(usual.heights_m, asked.heights_m)
+
+
+@pytest.mark.slow
+def test_a_later_start_is_of_the_soil_the_density_the_pile_and_the_fidelity_of_the_settings():
+    given = {"soil": "gravel", "density": "heavy", "pile": "two_heaps", "fidelity": "fast"}
+    settings = ExcavatorSettings.of(given)
+    named = {"soil": settings.dug_soil, "pile": "two_heaps", "fidelity": "fast"}
+    assert start_of(settings, 1, 1) is draw_start(settings.scene_set, 1, 1, **named)
 
 
 @pytest.mark.slow
