@@ -126,5 +126,5 @@ class EmulatedSite:
         """Draw a later scene meanwhile, which is kept: that can take longer than a robot waits for a picture."""
         settings = self._settings
         if isinstance(settings, ExcavatorSettings):
-            options = {"soil": settings.dug_soil, "pile": settings.pile}
+            options = {"soil": settings.soil, "pile": settings.pile}
             Thread(target=draw_scene, args=(settings.scene_set, scene_id), kwargs=options, daemon=True).start()

@@ -57,20 +57,22 @@ def test_every_command_digs_the_soil_it_is_given(start, tmp_path):
     assert len(set(seen.values())) == len(PRESETS)
 
 
-def a_frame_of(setting, value, folder):
-    """Return the first picture of an environment, what its metrics say of the setting, and the first of a recording."""
+def a_start_of(setting, value, folder):
+    """Return the first picture of an environment, the first of a recording, and the density of what is dug."""
     config = ExcavatorEnvConfig(**{setting: value}, episode_length=1, metrics_path=folder / f"{value}.jsonl")
     vector = config.create_envs(1)["excavator"][0]
     observation, _ = vector.reset(seed=[0])
     vector.step(np.zeros((1, 4), np.float32))
     vector.close()
     assert json.loads((folder / f"{value}.jsonl").read_text())[setting] == value
+    density_kg_m3 = vector.envs[0].unwrapped.world.soil.density_kg_m3
     out = folder / value
     assert main(["demos", *PLAYED, f"--env.{setting}={value}", f"--out={out}", "--keep_failures"]) == 0
     (table,) = [pq.read_table(path) for path in out.glob("data/*/*.parquet")]
     assert set(table[f"excav.{setting}"].to_pylist()) == {value}
     assert main(["qc", str(out), "--replays=1"]) == 0  # the same pile is drawn from the columns
-    return observation["pixels"]["main"].tobytes(), table["observation.images.main"][0]["bytes"].as_py()
+    recorded = table["observation.images.main"][0]["bytes"].as_py()
+    return observation["pixels"]["main"].tobytes(), recorded, density_kg_m3
 
 
 @pytest.mark.slow
@@ -78,8 +80,10 @@ def a_frame_of(setting, value, folder):
     ("setting", "values"), [("pile", ("heaps", "two_heaps", "ridge")), ("density", ("light", "usual", "heavy"))]
 )
 def test_pile_and_density_are_chosen_by_name_kept_in_data_and_told_in_metrics(setting, values, tmp_path):
-    seen = [a_frame_of(setting, value, tmp_path) for value in values]
+    seen = [a_start_of(setting, value, tmp_path) for value in values]
     assert len(set(seen)) == len(values)
+    pictures = {(shown, recorded) for shown, recorded, _ in seen}
+    assert len(pictures) == (1 if setting == "density" else len(values))  # of another density are the same piles
 
 
 def test_the_density_reaches_the_ground():

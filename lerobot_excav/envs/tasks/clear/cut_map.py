@@ -11,7 +11,6 @@ from lerobot_excav.envs.machines.excavator.layout import TARGET_BOX, cylinder_fr
 from lerobot_excav.envs.soil.parameters import PRESETS
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord
 from lerobot_excav.envs.tasks.scoop.scene import cell_centres_w, draw_scene
-from lerobot_excav.envs.tasks.scoop.settings import soil_at_density
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.envs.tasks.scoop.targets import Target
 
@@ -64,8 +63,7 @@ def _pile_is_known(pile: ClearRecord) -> bool:
 
 
 def _draw_pile_heights(axes: Any, pile: ClearRecord) -> None:
-    soil = soil_at_density(pile.soil, pile.density)
-    scene = draw_scene(pile.scene_set, pile.scene_id, soil=soil, pile=pile.pile)
+    scene = draw_scene(pile.scene_set, pile.scene_id, soil=pile.soil, pile=pile.pile)
     axes.contourf(*cell_centres_w(), scene.heights_m.T, levels=[*_LEVELS_M, 2.0], cmap="YlOrBr", alpha=0.35)
 
 

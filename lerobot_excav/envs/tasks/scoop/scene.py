@@ -48,7 +48,7 @@ def draw_scene(scene_set: str, scene_id: int, *, soil: str | SoilParameters = "s
     Args:
         scene_set: One of `settings.SCENE_SETS`. No scene of one set can occur in another.
         scene_id: Any integer from 0.
-        soil: Name of the soil preset, or parameters, which set slope and density of the pile.
+        soil: Name of the soil preset, or parameters, which set the slope of the pile, and its volume by their density.
         pile: Shape of the pile, one of `PILES`.
 
     Raises:

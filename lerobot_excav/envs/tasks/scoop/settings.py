@@ -38,7 +38,7 @@ class ExcavatorSettings(RetargetSettings):
         "Soil preset", default="sand", choices=tuple(PRESETS), also=SoilParameters, is_column=True, changes_start=True
     )
     density: str = setting(
-        "Density of the soil: as the preset has it, or 20 % less or more; a pile of the same mass is larger or smaller",
+        "Density of the soil: as the preset has it, or 20 % less or more; the same piles are lighter or heavier",
         default="usual",
         choices=tuple(DENSITIES),
         is_column=True,

@@ -7,6 +7,7 @@ soil is laid down, so that a start is nothing but heights and a pose: it can be 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from lerobot_excav.envs.tasks.scoop.cycle import DigCycle
 from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.envs.tasks.scoop.operator.sight import CycleSight
 from lerobot_excav.envs.tasks.scoop.scene import Scene, draw_scene
-from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings
+from lerobot_excav.envs.tasks.scoop.settings import ExcavatorSettings, soil_at_density
 from lerobot_excav.envs.tasks.scoop.spec import CYCLE_LIMIT_S
 from lerobot_excav.envs.tasks.scoop.targets import Target
 from lerobot_excav.envs.tasks.settings import SCENE_SETS
@@ -43,27 +44,30 @@ def draw_start(
     stage: int,
     *,
     soil: str | SoilParameters = "sand",
+    density: str = "usual",
     pile: str = "heaps",
     fidelity: str = "standard",
     propose: Propose = propose_regions,
 ) -> Scene:
     """Return the scene as it is after `stage` cycles, with the regions that are proposed then; memoised.
 
-    Stage 0 is the scene as drawn, with its own targets. The same arguments give the same start, byte for byte.
+    Stage 0 is the scene as drawn, with its own targets, and the same pile whatever its soil's density is. The
+    same arguments give the same start, byte for byte.
 
     Raises:
         ConfigurationError: An argument is not one of the allowed values.
     """
     if stage == 0:
         return draw_scene(scene_set, scene_id, soil=soil, pile=pile)
-    return _later_start(scene_set, scene_id, stage, soil, pile, fidelity, propose)
+    return _later_start(scene_set, scene_id, stage, soil, density, pile, fidelity, propose)
 
 
 def start_of(settings: ExcavatorSettings, scene_id: int, stage: int) -> Scene:
     """Return the start that settings, scene and stage determine; see `draw_start`."""
     return draw_start(
         *(settings.scene_set, scene_id, stage),
-        soil=settings.dug_soil,
+        soil=settings.soil,
+        density=settings.density,
         pile=settings.pile,
         fidelity=settings.fidelity,
     )
@@ -71,13 +75,21 @@ def start_of(settings: ExcavatorSettings, scene_id: int, stage: int) -> Scene:
 
 @lru_cache(maxsize=64)
 def _later_start(
-    scene_set: str, scene_id: int, stage: int, soil: str | SoilParameters, pile: str, fidelity: str, propose: Propose
+    scene_set: str,
+    scene_id: int,
+    stage: int,
+    soil: str | SoilParameters,
+    density: str,
+    pile: str,
+    fidelity: str,
+    propose: Propose,
 ) -> Scene:
-    before = draw_start(scene_set, scene_id, stage - 1, soil=soil, pile=pile, fidelity=fidelity, propose=propose)
+    given: dict[str, Any] = {"soil": soil, "density": density, "pile": pile, "fidelity": fidelity}
+    before = draw_start(scene_set, scene_id, stage - 1, **given, propose=propose)
     if not before.targets:  # nothing is left to be dug
         return before
     rehearse()
-    worksite = Worksite(soil=soil, fidelity=fidelity)
+    worksite = Worksite(soil=soil_at_density(soil, density), fidelity=fidelity)
     worksite.reset(before)
     target = before.targets[0] if stage > 1 else propose(worksite)[0]
     operator = DigOperator(rng=operator_rng(scene_set, scene_id, stage))

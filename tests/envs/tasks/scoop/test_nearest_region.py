@@ -34,14 +34,15 @@ def test_the_swing_is_counted_from_the_box_to_either_side():
 
 def test_it_is_the_shortest_swing_whatever_the_rank_of_the_region(monkeypatch):
     asked = []
+    given = {"soil": "gravel", "density": "heavy", "pile": "ridge", "fidelity": "fast"}
 
     def drawn(*start, **options):
         asked.append((start, options))
         return Start(-0.3, 0.2, 0.1, -0.1)
 
     monkeypatch.setattr(stage, "draw_start", drawn)
-    assert nearest_target(ExcavatorSettings(scene_set="val", soil="gravel", fidelity="fast"), 7, 3) == 1
-    assert asked == [(("val", 7, 3), {"soil": "gravel", "pile": "heaps", "fidelity": "fast"})]
+    assert nearest_target(ExcavatorSettings.of({"scene_set": "val", **given}), 7, 3) == 1
+    assert asked == [(("val", 7, 3), given)]
     monkeypatch.setattr(stage, "draw_start", lambda *_, **__: Start())
     assert nearest_target(ExcavatorSettings(), 7, 3) == 0
 

@@ -34,8 +34,8 @@ def test_stage_0_is_the_scene_itself():
     assert start_at(0) is draw_scene(*SCENE, soil="sand", pile="heaps")
 
 
-@pytest.mark.parametrize("given", [{"soil": "gravel"}, {"density": "heavy"}, {"pile": "ridge"}, {"scene_set": "val"}])
-def test_a_start_is_of_the_scene_set_the_soil_the_density_and_the_pile_of_the_settings(given):
+@pytest.mark.parametrize("given", [{"soil": "gravel"}, {"pile": "ridge"}, {"scene_set": "val"}])
+def test_a_start_is_of_the_scene_set_the_soil_and_the_pile_of_the_settings(given):
     usual, asked = (start_of(ExcavatorSettings.of(settings), 1, 0) for settings in ({}, given))
     assert not np.array_equal(usual.heights_m, asked.heights_m)
 
@@ -44,8 +44,15 @@ def test_a_start_is_of_the_scene_set_the_soil_the_density_and_the_pile_of_the_se
 def test_a_later_start_is_of_the_soil_the_density_the_pile_and_the_fidelity_of_the_settings():
     given = {"soil": "gravel", "density": "heavy", "pile": "two_heaps", "fidelity": "fast"}
     settings = ExcavatorSettings.of(given)
-    named = {"soil": settings.dug_soil, "pile": "two_heaps", "fidelity": "fast"}
-    assert start_of(settings, 1, 1) is draw_start(settings.scene_set, 1, 1, **named)
+    start = start_of(settings, 1, 1)
+    assert start is draw_start(settings.scene_set, 1, 1, **given)
+    usual = start_of(ExcavatorSettings.of({**given, "density": "usual"}), 1, 1)
+    assert not np.array_equal(start.heights_m, usual.heights_m)
+
+
+def test_a_pile_is_the_same_whatever_its_density_is():
+    light, heavy = (start_of(ExcavatorSettings.of({"density": density}), 1, 0) for density in ("light", "heavy"))
+    assert light is heavy
 
 
 @pytest.mark.slow
