@@ -235,6 +235,7 @@ CLEAR_MEASURES = TaskMeasures(
     method_figures={
         "pile removed over cycles": "lerobot_excav.envs.tasks.clear.method_figures:draw_progress",
         "what came of the cycles": "lerobot_excav.envs.tasks.clear.method_figures:draw_failures",
+        "how far from their regions cycles begin": "lerobot_excav.envs.tasks.clear.entry_figure:draw_entries",
         "where each dug on the same pile": "lerobot_excav.envs.tasks.clear.method_figures:draw_same_pile",
     },
 )

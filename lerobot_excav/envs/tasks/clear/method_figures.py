@@ -27,7 +27,7 @@ def draw_progress(methods: Methods, path: Path) -> None:
 
     A pile that ends early keeps what it has reached.
     """
-    figure = _figure(8.0, 4.2)
+    figure = new_figure(8.0, 4.2)
     axes = figure.subplots()
     for name, piles in methods.items():
         removed = 100.0 * np.array([removed_by_cycle(pile) for pile in piles])
@@ -40,7 +40,7 @@ def draw_progress(methods: Methods, path: Path) -> None:
     axes.set_title("mean of the piles; shaded: their middle half", fontsize=8)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    _save(figure, path)
+    save(figure, path)
 
 
 def removed_by_cycle(pile: ClearRecord) -> NDArray[np.float64]:
@@ -51,7 +51,7 @@ def removed_by_cycle(pile: ClearRecord) -> NDArray[np.float64]:
 
 def draw_failures(methods: Methods, path: Path) -> None:
     """Draw what came of the cycles, a bar for every method."""
-    figure = _figure(8.0, 1.3 + 0.45 * len(methods))
+    figure = new_figure(8.0, 1.3 + 0.45 * len(methods))
     axes = figure.subplots()
     kinds = (NO_FAILURE, *FAILURES)
     shares = 100.0 * np.array([failure_shares(piles) for piles in methods.values()])
@@ -62,7 +62,7 @@ def draw_failures(methods: Methods, path: Path) -> None:
     axes.invert_yaxis()
     axes.set(xlabel="cycles of a pile [%], mean of the piles", xlim=(0, 100))
     figure.legend(fontsize=8, loc="outside lower center", ncols=4)
-    _save(figure, path)
+    save(figure, path)
 
 
 def failure_shares(piles: Sequence[ClearRecord]) -> list[float]:
@@ -81,7 +81,7 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
     Of a method with several trainings the first one is shown.
     """
     shared = set.intersection(*({_at_first(pile) for pile in piles} for piles in methods.values()))
-    figure = _figure(4.2 * len(methods), 4.6)
+    figure = new_figure(4.2 * len(methods), 4.6)
     if not shared:
         figure.text(0.5, 0.5, "No pile was cleared by all of them.", ha="center")
     else:
@@ -91,7 +91,7 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
             draw_cuts(axes, first)
             which = f", first of {1 + len(others)} trainings" if others else ""
             axes.set_title(f"{name}{which}\n{axes.get_title()}", fontsize=8)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _at_first(pile: ClearRecord) -> tuple[Any, ...]:
@@ -99,12 +99,14 @@ def _at_first(pile: ClearRecord) -> tuple[Any, ...]:
     return (*pile.key, pile.simulation_version, pile.soil, pile.density, pile.pile, pile.fidelity)
 
 
-def _save(figure: "Figure", path: Path) -> None:
+def save(figure: "Figure", path: Path) -> None:
+    """Write a figure into a file, the same bytes for the same figure."""
     # Tight, because the constrained layout lets titles of panels of a fixed aspect reach beyond the picture.
     figure.savefig(path, metadata={"Software": None}, bbox_inches="tight", pad_inches=0.08)
 
 
-def _figure(width_in: float, height_in: float) -> "Figure":
+def new_figure(width_in: float, height_in: float) -> "Figure":
+    """Return an empty figure."""
     # Imported here: only a report needs it. Without pyplot nothing chooses a window system.
     from matplotlib.figure import Figure
 
