@@ -126,33 +126,34 @@ def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
 
 
+PARTS = ("0-2", "2-3")
 EPISODES = [metrics_line(SCOOP_LINE, number) for number in range(5)]
 
 
 def write_parts(folder, **of_b):
-    """Write the metrics of two parts, `a` and `b`; `of_b` is what differs in the origin of the second."""
-    for name, part in (("a", EPISODES[:2]), ("b", EPISODES[2:])):
+    """Write the metrics of two parts, of scenes 0 and 1, and 2 to 4; `of_b` differs in the second's origin."""
+    for name, part in ((PARTS[0], EPISODES[:2]), (PARTS[1], EPISODES[2:])):
         parts = [{**episode, "evaluation": name, "episode_ix": number} for number, episode in enumerate(part)]
         (folder / f"{name}.jsonl").write_text("".join(json.dumps(episode) + "\n" for episode in parts))
-        origin = {"command": f"play {name}", "commit": "c", "modified": name == "b", "seconds": 2.0}
-        origin |= {"policy": "p", "packages": {"mujoco": "3"}, **(of_b if name == "b" else {})}
+        origin = {"command": f"play {name}", "commit": "c", "modified": name == PARTS[1], "seconds": 2.0}
+        origin |= {"policy": "p", "packages": {"mujoco": "3"}, **(of_b if name == PARTS[1] else {})}
         (folder / f"{name}.json").write_text(json.dumps(origin))
-    return [folder / "a.jsonl", folder / "b.jsonl"]
+    return [folder / f"{name}.jsonl" for name in PARTS]
 
 
 def test_parts_of_different_commits_say_so(tmp_path):
     shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
     shards["merge_metrics"](write_parts(tmp_path, commit="d"), tmp_path / "whole.jsonl")
     merged = json.loads((tmp_path / "whole.json").read_text())
-    assert merged["command"] == "play a && play b  # parts by commits c, d"
+    assert merged["command"] == "play 0-2 && play 2-3  # parts by commits c, d"
 
 
 @pytest.mark.parametrize("differs", [{"policy": "q"}, {"packages": {"mujoco": "4"}}])
 def test_parts_of_another_policy_or_of_other_packages_are_not_put_together(tmp_path, differs):
     shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    with pytest.raises(Exception, match=f"{next(iter(differs))} of .*b.jsonl differs"):
+    with pytest.raises(Exception, match=f"{next(iter(differs))} of .*2-3.jsonl differs"):
         shards["merge_metrics"](write_parts(tmp_path, **differs), tmp_path / "whole.jsonl")
-    assert {path.stem for path in tmp_path.iterdir()} == {"a", "b"}
+    assert {path.stem for path in tmp_path.iterdir()} == set(PARTS)
 
 
 def test_a_part_that_two_runs_have_played_at_once_is_not_put_into_a_row(tmp_path):
@@ -161,9 +162,17 @@ def test_a_part_that_two_runs_have_played_at_once_is_not_put_into_a_row(tmp_path
     twice = [json.loads(text) for text in parts[1].read_text().splitlines() for _ in range(2)]
     lines = [{**episode, "evaluation": "bc"[number % 2]} for number, episode in enumerate(twice)]
     parts[1].write_text("".join(json.dumps(line) + "\n" for line in lines))
-    with pytest.raises(Exception, match=r"b\.jsonl holds several evaluations"):
+    with pytest.raises(Exception, match=r"2-3\.jsonl holds several evaluations"):
         shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
     assert not (tmp_path / "whole.jsonl").exists()
+
+
+def test_a_part_that_lacks_an_episode_is_not_put_into_a_row(tmp_path):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    parts = write_parts(tmp_path)
+    parts[1].write_text("".join(parts[1].read_text().splitlines(keepends=True)[:-1]))
+    with pytest.raises(Exception, match=r"2-3\.jsonl holds 2 episodes, not as many as its name says"):
+        shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
 
 
 def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):
@@ -178,8 +187,8 @@ def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evalu
     assert same == [{**episode, "evaluation": 0, "episode_ix": 0} for episode in episodes]
     merged = json.loads((tmp_path / "whole.json").read_text())
     known = {"commit": "c", "policy": "p", "packages": {"mujoco": "3"}}
-    assert merged == {"command": "play a && play b", "modified": True, "seconds": 4.0, **known}
-    shards["remove_parts"]([tmp_path / "a.jsonl", tmp_path / "b.jsonl"])
+    assert merged == {"command": "play 0-2 && play 2-3", "modified": True, "seconds": 4.0, **known}
+    shards["remove_parts"]([tmp_path / f"{name}.jsonl" for name in PARTS])
     assert {path.name for path in tmp_path.iterdir()} == {"whole.jsonl", "whole.json"}
 
 

@@ -27,17 +27,19 @@ def keep_videos(out, name, number):
 
 
 def lines_of_part(part):
-    """Return the episodes of a part of one evaluation.
+    """Return the episodes of a part, `FIRST-NUMBER.jsonl`.
 
     Two runs of a workflow without a lock may play a part at the same time, into one file: a row would count its scenes
-    twice.
+    twice, or lack some.
 
     Raises:
-        WorkflowError: The part holds several evaluations.
+        WorkflowError: The part holds several evaluations, or another number of episodes.
     """
     lines = [json.loads(line) for line in Path(part).read_text(encoding="utf-8").splitlines()]
     if len({line.get("evaluation") for line in lines}) > 1:
         raise WorkflowError(f"{part} holds several evaluations, and one is allowed; remove it, to play it again")
+    if len(lines) != int(Path(part).stem.partition("-")[2]):
+        raise WorkflowError(f"{part} holds {len(lines)} episodes, not as many as its name says; remove it, to play it again")
     return lines
 
 

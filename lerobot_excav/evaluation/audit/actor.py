@@ -13,8 +13,8 @@ from lerobot_excav.envs.tasks.registry import task_of_settings
 from lerobot_excav.envs.tasks.settings import TaskSettings
 from lerobot_excav.errors import ConfigurationError, require
 
-# What LeRobot's policies and this package's call their settings of the size to which they bring all pictures.
-_RESIZING = ("resize_to", "resize_imgs_with_padding", "image_resolution", "resize_shape", "image_resize_shape")
+# What policies of LeRobot call the size to which they bring all pictures. That of this package takes its own size only.
+_RESIZING = ("resize_imgs_with_padding", "image_resolution", "resize_shape", "image_resize_shape")
 _FILLED = schema.camera_key("empty_camera_")
 
 
@@ -117,8 +117,8 @@ def policy_config(checkpoint: Path, overrides: tuple[str, ...] = ()) -> Any:
 def require_same_machine(config: Any, settings: TaskSettings) -> None:
     """Check that a policy reads and commands what a machine has, before its numbers meet in the middle of an episode.
 
-    Pictures of another size are left to a policy that resizes them. Some policies of LeRobot declare cameras that they
-    fill themselves (`empty_cameras`).
+    Pictures of another size are left to a policy of LeRobot that resizes them. Some declare cameras that they fill
+    themselves (`empty_cameras`).
 
     Args:
         config: Configuration of the policy.
@@ -137,11 +137,12 @@ def require_same_machine(config: Any, settings: TaskSettings) -> None:
     for key, feature in {**(config.input_features or {}), **(config.output_features or {})}.items():
         if key.startswith(_FILLED):
             continue
-        is_free = resizes and key in sizes and key.startswith(schema.camera_key(""))
+        shape, there = tuple(feature.shape), sizes.get(key, ())
+        is_free = resizes and key.startswith(schema.camera_key("")) and shape[:1] == there[:1]
         require(
-            is_free or tuple(feature.shape) == sizes.get(key),
-            f"{config.pretrained_path} was trained with {key} of shape {tuple(feature.shape)}, and {spec.id} "
-            f"has {sizes.get(key, 'none')}; give --env.type of its machine, or its --env.observation_height and _width",
+            is_free or shape == there,
+            f"{config.pretrained_path} was trained with {key} of shape {shape}, and {spec.id} has {there or 'none'}; "
+            "give --env.type of its machine, or its --env.observation_height and _width",
         )
 
 

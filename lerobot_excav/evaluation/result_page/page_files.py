@@ -8,7 +8,14 @@ from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_folder import ReportFolder
 from lerobot_excav.evaluation.result_page.contents import CURVES
-from lerobot_excav.evaluation.result_page.kept_grid import SHOWN, VIDEO_GRID, is_poorer, kept_clips, shown_text
+from lerobot_excav.evaluation.result_page.kept_grid import (
+    SHOWN,
+    VIDEO_GRID,
+    is_poorer,
+    kept_clips,
+    shown_clips,
+    shown_text,
+)
 from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import ResultPage
 from lerobot_excav.evaluation.result_page.page_text import CURVE_PLOT, page_text
@@ -36,8 +43,8 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
     report.require_free(TEXTS)
     with report.staged() as stage:
         copies = _keep_metrics(page, stage / METRICS, folder / METRICS)
-        kept, clips = kept_clips(report, page.contents), present_clips(page)
-        is_kept = is_poorer(clips, kept, page.contents)
+        kept, clips = kept_clips(report), shown_clips(page, present_clips(page))
+        is_kept = kept is not None and is_poorer(clips, kept, page)
         pictures = [*_plots(page, stage), *([] if is_kept else _grid(page, stage))]
         beside = {*pictures, *({CURVE_PLOT, VIDEO_GRID} & set(report.own))}
         text = page_text(page, files=beside, clips=kept if is_kept or not clips else clips)
@@ -78,5 +85,5 @@ def _grid(page: ResultPage, folder: Path) -> list[str]:
     if not rows:
         return []
     write_grid(folder / VIDEO_GRID, rows)
-    write_whole(folder / SHOWN, shown_text(present_clips(page)))
+    write_whole(folder / SHOWN, shown_text(shown_clips(page, present_clips(page))))
     return [VIDEO_GRID, SHOWN]

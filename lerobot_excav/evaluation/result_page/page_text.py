@@ -14,8 +14,7 @@ from lerobot_excav.evaluation.markdown import (
 from lerobot_excav.evaluation.metrics import Evaluation
 from lerobot_excav.evaluation.provenance import EvaluationOrigin
 from lerobot_excav.evaluation.report_text import simulations
-from lerobot_excav.evaluation.result_page.contents import Clips
-from lerobot_excav.evaluation.result_page.kept_grid import VIDEO_GRID
+from lerobot_excav.evaluation.result_page.kept_grid import VIDEO_GRID, ShownClips, is_of_earlier_metrics, shown_clips
 from lerobot_excav.evaluation.result_page.method_figures import method_figures
 from lerobot_excav.evaluation.result_page.page import PageRow, PageSection, ResultPage
 from lerobot_excav.evaluation.training import TrainingFacts
@@ -26,11 +25,11 @@ _TRAINING = ("training", "data", "demonstrations", "steps", "batch", "samples", 
 _POINT = ("policy", "played with", "step", "minutes", "n", "success [%]")
 
 
-def page_text(page: ResultPage, *, files: Collection[str] = (), clips: Sequence[Clips] | None = None) -> str:
+def page_text(page: ResultPage, *, files: Collection[str] = (), clips: Sequence[ShownClips] | None = None) -> str:
     """Write a page as Markdown.
 
     `files` are the plots and videos that lie beside it; `clips` what the video grid shows, from top to bottom, or None
-    for all that the contents name.
+    for all that the contents name and that was played.
     """
     return render(
         "page",
@@ -44,7 +43,10 @@ def page_text(page: ResultPage, *, files: Collection[str] = (), clips: Sequence[
         curve_rows=_points(page),
         plot=CURVE_PLOT if CURVE_PLOT in files else "",
         video=VIDEO_GRID if VIDEO_GRID in files else "",
-        clips=page.contents.clips if clips is None else clips,
+        clips=[
+            (row, is_of_earlier_metrics(row, page))
+            for row in (shown_clips(page, page.contents.clips) if clips is None else clips)
+        ],
         training_header=_TRAINING,
         training_rows=[_training(training) for training in page.trainings],
         seed=page.bootstrap_seed,

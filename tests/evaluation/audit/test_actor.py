@@ -95,7 +95,7 @@ def policy_of(cameras=CAMERAS, state=8, **settings):
     [
         policy_of(),
         policy_of(cameras={**CAMERAS, "empty_camera_0": (3, 480, 640)}),
-        policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_to=(96, 128)),
+        policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_imgs_with_padding=(512, 512)),
         SimpleNamespace(pretrained_path="policy", input_features=None, output_features=None),
     ],
     ids=["as it is", "a camera that the policy fills itself", "pictures that the policy resizes", "nothing declared"],
@@ -107,9 +107,16 @@ def test_a_policy_that_can_work_on_a_machine_is_let_through(config):
 @pytest.mark.parametrize(
     ("config", "words"),
     [
-        (policy_of(cameras={**CAMERAS, "wrist": (3, 96, 128)}, resize_to=(96, 128)), "wrist .* has none"),
-        (policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_to=None), r"cab of shape \(3, 48, 64\)"),
-        (policy_of(state=7, resize_to=(96, 128)), r"state of shape \(7,\)"),
+        (
+            policy_of(cameras={**CAMERAS, "wrist": (3, 96, 128)}, resize_imgs_with_padding=(512, 512)),
+            "wrist .* has none",
+        ),
+        (
+            policy_of(cameras={**CAMERAS, "cab": (1, 96, 128)}, resize_imgs_with_padding=(512, 512)),
+            r"cab of shape \(1, 96",
+        ),
+        (policy_of(cameras={**CAMERAS, "cab": (3, 48, 64)}, resize_to=(96, 128)), r"cab of shape \(3, 48, 64\)"),
+        (policy_of(state=7, resize_imgs_with_padding=(512, 512)), r"state of shape \(7,\)"),
     ],
 )
 def test_a_policy_that_cannot_work_on_a_machine_is_refused_though_it_resizes_pictures(config, words):

@@ -102,18 +102,41 @@ def test_a_grid_is_made_again_when_the_contents_name_other_episodes(finished, ou
     (clips,) = finished.clips
     write_page(make_page(finished.model_copy(update={"clips": (clips.model_copy(update={"episodes": (1,)}),)})), out)
     assert "- `paired`, episodes 1\n" in (out / "report.md").read_text()
-    assert json.loads((out / "rollouts.json").read_text()) == {"clips": [{"label": "paired", "episodes": [1]}]}
+    (shown,) = json.loads((out / "rollouts.json").read_text())["clips"]
+    assert (shown["label"], shown["episodes"]) == ("paired", [1])
 
 
-def test_a_grid_of_version_0_2_0_is_taken_to_show_what_the_contents_name(finished, out, tmp_path):
+@pytest.mark.parametrize("videos_left", [True, False])
+def test_a_grid_of_a_row_that_was_played_again_does_not_pass_for_the_new_one(finished, out, tmp_path, videos_left):
+    film = (out / "rollouts.mp4").read_bytes()
+    metrics = tmp_path / "test/paired/metrics.jsonl"
+    metrics.write_text(metrics.read_text().replace('"episode_return": ', '"episode_return": 1'))
+    videos = tmp_path / "test/paired/videos/fr5_grasp_0"
+    for number in (0,) if videos_left else (0, 1):
+        (videos / f"eval_episode_{number}.mp4").unlink()
+    write_page(make_page(finished), out)
+    told = "episodes 1\n" if videos_left else "episodes 0, 1 of an earlier evaluation\n"
+    assert f"- `paired`, {told}" in (out / "report.md").read_text()
+    assert ((out / "rollouts.mp4").read_bytes() == film) is not videos_left
+
+
+@pytest.mark.parametrize("video", [True, False])
+def test_a_grid_of_version_0_2_0_is_made_again_of_what_is_there_else_it_is_taken_to_show_what_was_played(
+    finished, out, tmp_path, video
+):
     listed = json.loads((out / "report_files.json").read_text())
     del listed["files"]["rollouts.json"]
     (out / "report_files.json").write_text(json.dumps(listed))
     (out / "rollouts.json").unlink()
+    videos = tmp_path / "test/paired/videos/fr5_grasp_0"
+    for number in (0,) if video else (0, 1):
+        (videos / f"eval_episode_{number}.mp4").unlink()
+    (clips,) = finished.clips
+    more = finished.model_copy(update={"clips": (clips, clips.model_copy(update={"label": "later"}))})
+    write_page(make_page(more), out)
     text = (out / "report.md").read_text()
-    shutil.rmtree(tmp_path / "test/paired/videos")
-    write_page(make_page(finished), out)
-    assert (out / "report.md").read_text() == text
+    assert f"- `paired`, episodes {'1' if video else '0, 1'}\n" in text
+    assert "- `later`" not in text  # it was not played
 
 
 def test_videos_may_lie_elsewhere_by_the_name_of_their_evaluation(finished, tmp_path):

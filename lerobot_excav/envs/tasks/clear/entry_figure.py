@@ -21,7 +21,10 @@ Cylinder = tuple[float, float, float]
 
 
 def draw_entries(methods: Methods, path: Path) -> None:
-    """Draw for every cycle how far from the middle of its region loading begins: the median, and the middle half."""
+    """Draw for every cycle how far from the middle of its region loading begins: the median, and the middle half.
+
+    Cycles that loaded nothing are left out.
+    """
     figure = new_figure(11.0, 4.8)
     panels = figure.subplots(1, 2, sharey=True)
     for name, piles in methods.items():
@@ -33,10 +36,10 @@ def draw_entries(methods: Methods, path: Path) -> None:
         panels, ("sideways: the swing stops too early or too late", "lengthwise: the reach"), strict=True
     ):
         axes.axhline(0.5 * PATCH_SIZE_M, color="black", linestyle=":", linewidth=1.0)
-        axes.set(xlabel="cycle", xlim=(1, CYCLES), xticks=range(2, CYCLES + 1, 2), ylim=(0.0, 1.2))
+        axes.set(xlabel="cycle", xlim=(1, CYCLES), xticks=range(2, CYCLES + 1, 2), ylim=(0.02, 5.0), yscale="log")
         axes.set_title(f"{way}; dotted: half a region", fontsize=8)
         axes.grid(alpha=0.3)
-    panels[0].set_ylabel("from the middle of the region [m]")
+    panels[0].set_ylabel("from the middle of the region [m]\n(cycles that loaded nothing are left out)", fontsize=8)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=2)
     save(figure, path)

@@ -95,8 +95,9 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
 
 
 def _at_first(pile: ClearRecord) -> tuple[Any, ...]:
-    """Return what determines a pile as it was at first."""
-    return (*pile.key, pile.simulation_version, pile.soil, pile.density, pile.pile, pile.fidelity)
+    """Return what determines a pile as it was at first; what digging depends on does so at later stages only."""
+    dug = (pile.density, pile.fidelity) if pile.stage else ()
+    return (*pile.key, pile.simulation_version, pile.soil, pile.pile, *dug)
 
 
 def save(figure: "Figure", path: Path) -> None:

@@ -48,7 +48,7 @@ def test_pictures_are_drawn_of_one_method_and_of_several(piles, tmp_path, draw):
         assert Image.open(tmp_path / "figure.png").width > 300
 
 
-@pytest.mark.parametrize("changes", [{"scene_id": 7}, {"pile": "ridge"}, {"density": "light"}, {"soil": "gravel"}])
+@pytest.mark.parametrize("changes", [{"scene_id": 7}, {"pile": "ridge"}, {"soil": "gravel"}])
 def test_methods_without_a_common_pile_are_said_to_have_none(piles, tmp_path, changes):
     other = piles[0].model_copy(update=changes)
     method_figures.draw_same_pile({"a": piles[:1], "b": [other]}, tmp_path / "figure.png")
