@@ -16,6 +16,9 @@ from lerobot_excav.envs.tasks.scoop.feasibility import PATCH_SIZE_M
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+FIRST_CYCLE, LATER_CYCLES = range(1), range(1, CYCLES)
+"""The first cycle of a pile begins between pile and box, the others over the box, where the one before has dumped."""
+
 Cylinder = tuple[float, float, float]
 """Radius [m], swing angle [rad] and height [m] of a place, seen from the machine."""
 
@@ -28,10 +31,10 @@ def draw_entries(methods: Methods, path: Path) -> None:
     figure = new_figure(11.0, 4.8)
     panels = figure.subplots(1, 2, sharey=True)
     for name, piles in methods.items():
-        slope = swing_slope(piles)
-        words = "" if slope is None else f" (swing follows with {slope:.2f})"
+        slopes = [swing_slope(piles, cycles) for cycles in (FIRST_CYCLE, LATER_CYCLES)]
+        words = " then ".join("-" if slope is None else f"{slope:.2f}" for slope in slopes)
         for axes, errors in zip(panels, entry_errors_m(piles), strict=True):
-            _draw_errors(axes, errors, f"{name}{words}")
+            _draw_errors(axes, errors, f"{name} (swing: {words})")
     for axes, way in zip(
         panels, ("sideways: the swing stops too early or too late", "lengthwise: the reach"), strict=True
     ):
@@ -57,12 +60,12 @@ def entry_errors_m(piles: Sequence[ClearRecord]) -> tuple[NDArray[np.float64], N
     return sideways_m, lengthwise_m
 
 
-def swing_slope(piles: Sequence[ClearRecord]) -> float | None:
+def swing_slope(piles: Sequence[ClearRecord], cycles: range) -> float | None:
     """Return the slope of the swing angle of entries on that of their regions: 1 is obedience, 0 a default angle.
 
-    All but the first cycle of a pile, which begins at another pose, are taken together. None with fewer than two.
+    The cycles, by their numbers from 0, are taken together. None with fewer than two regions.
     """
-    angles = np.array([(region[1], entry[1]) for _, number, region, entry in _entries(piles) if number > 0])
+    angles = np.array([(region[1], entry[1]) for _, number, region, entry in _entries(piles) if number in cycles])
     if len(angles) < 2 or np.ptp(angles[:, 0]) == 0.0:
         return None
     return float(np.polyfit(angles[:, 0], angles[:, 1], 1)[0])

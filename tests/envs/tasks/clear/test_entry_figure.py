@@ -7,7 +7,13 @@ import pytest
 from PIL import Image
 
 from lerobot_excav.envs.machines.excavator.constants import MACHINE_POS_W
-from lerobot_excav.envs.tasks.clear.entry_figure import draw_entries, entry_errors_m, swing_slope
+from lerobot_excav.envs.tasks.clear.entry_figure import (
+    FIRST_CYCLE,
+    LATER_CYCLES,
+    draw_entries,
+    entry_errors_m,
+    swing_slope,
+)
 from lerobot_excav.envs.tasks.clear.measures import ClearRecord
 from lerobot_excav.envs.tasks.clear.spec import CYCLES
 
@@ -50,14 +56,17 @@ def test_a_cycle_without_loading_has_no_error(pile):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.5, 1.0])
-def test_a_swing_that_goes_part_of_the_way_has_that_slope_whatever_the_first_cycle_does(pile, slope):
-    later = [((5.0, swing), (4.8, 0.1 + slope * swing)) for swing in (-0.4, -0.1, 0.2, 0.5)]
-    assert swing_slope([dug(pile, ((5.0, 0.0), (5.0, 3.0)), *later)]) == pytest.approx(slope)
+def test_a_swing_that_goes_part_of_the_way_has_that_slope_in_the_cycles_asked_for(pile, slope):
+    told = [((5.0, swing), (4.8, 0.1 + slope * swing)) for swing in (-0.4, -0.1, 0.2, 0.5)]
+    first = [dug(pile, cycle, ((5.0, 0.0), (5.0, 3.0))) for cycle in told]
+    later = [dug(pile, ((5.0, 0.0), (5.0, 3.0)), *told)]
+    assert swing_slope(first, FIRST_CYCLE) == pytest.approx(slope)
+    assert swing_slope(later, LATER_CYCLES) == pytest.approx(slope)
 
 
 def test_without_two_regions_there_is_no_slope(pile):
-    assert swing_slope([dug(pile, *[((5.0, 0.1), (5.0, 0.1))] * 3)]) is None
-    assert swing_slope([dug(pile)]) is None
+    assert swing_slope([dug(pile, *[((5.0, 0.1), (5.0, 0.1))] * 3)], LATER_CYCLES) is None
+    assert swing_slope([dug(pile)], FIRST_CYCLE) is None
 
 
 def test_the_picture_is_drawn_of_one_method_of_several_and_of_piles_without_cycles(pile, tmp_path):
