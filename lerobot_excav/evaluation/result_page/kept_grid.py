@@ -31,11 +31,10 @@ class _Shown(BaseModel):
 
 def shown_clips(page: ResultPage, clips: Sequence[Clips]) -> list[ShownClips]:
     """Return clips of a page's rows with what they are of; those of rows that were not played are left out."""
-    digests = _digests(page)
     return [
-        ShownClips(label=row.label, episodes=row.episodes, metrics_sha256=digests[row.label])
+        ShownClips(label=row.label, episodes=row.episodes, metrics_sha256=digest)
         for row in clips
-        if row.label in digests
+        if (digest := _digest(page, row.label)) is not None
     ]
 
 
@@ -66,13 +65,13 @@ def is_poorer(clips: Sequence[Clips], kept: Sequence[ShownClips], page: ResultPa
 
 def is_of_earlier_metrics(shown: ShownClips, page: ResultPage) -> bool:
     """Tell whether a kept row shows other episodes than those that the page's numbers are of."""
-    return _digests(page).get(shown.label) != shown.metrics_sha256
+    return _digest(page, shown.label) != shown.metrics_sha256
 
 
-def _digests(page: ResultPage) -> dict[str, str]:
-    """Return by label the digest of the metrics that the videos of a row are of: those of its first seed."""
-    first = {row.row.label: row.parts[0][1].path for row in page.rows}
-    return {label: hashlib.sha256(path.read_bytes()).hexdigest() for label, path in first.items()}
+def _digest(page: ResultPage, label: str) -> str | None:
+    """Return the digest of the metrics that the videos of a row are of, those of its first seed; None if not played."""
+    path = next((row.parts[0][1].path for row in page.rows if row.row.label == label), None)
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _episodes(clips: Sequence[Clips]) -> set[tuple[str, int]]:

@@ -11,6 +11,7 @@ from lerobot_excav.evaluation.result_page.contents import CURVES
 from lerobot_excav.evaluation.result_page.kept_grid import (
     SHOWN,
     VIDEO_GRID,
+    ShownClips,
     is_poorer,
     kept_clips,
     shown_clips,
@@ -45,7 +46,7 @@ def write_page(page: ResultPage, folder: Path) -> list[Path]:
         copies = _keep_metrics(page, stage / METRICS, folder / METRICS)
         kept, clips = kept_clips(report), shown_clips(page, present_clips(page))
         is_kept = kept is not None and is_poorer(clips, kept, page)
-        pictures = [*_plots(page, stage), *([] if is_kept else _grid(page, stage))]
+        pictures = [*_plots(page, stage), *([] if is_kept else _grid(page, clips, stage))]
         beside = {*pictures, *({CURVE_PLOT, VIDEO_GRID} & set(report.own))}
         text = page_text(page, files=beside, clips=kept if is_kept or not clips else clips)
         rows = "".join(json.dumps(row.as_dict()) + "\n" for row in page.rows)
@@ -80,10 +81,10 @@ def _plots(page: ResultPage, folder: Path) -> list[str]:
     return [*([CURVE_PLOT] if page.curves else []), *(figure.name for figure in figures)]
 
 
-def _grid(page: ResultPage, folder: Path) -> list[str]:
+def _grid(page: ResultPage, clips: list[ShownClips], folder: Path) -> list[str]:
     rows = grid_rows(page)
     if not rows:
         return []
     write_grid(folder / VIDEO_GRID, rows)
-    write_whole(folder / SHOWN, shown_text(shown_clips(page, present_clips(page))))
+    write_whole(folder / SHOWN, shown_text(clips))
     return [VIDEO_GRID, SHOWN]
