@@ -73,7 +73,7 @@ class ReportFolder:
         with tempfile.TemporaryDirectory(prefix=".report.", dir=self.folder) as temporary:
             stage = Path(temporary)
             yield stage
-            fresh = {p.relative_to(stage).as_posix(): _digest(p) for p in sorted(stage.rglob("*")) if p.is_file()}
+            fresh = {p.relative_to(stage).as_posix(): file_digest(p) for p in sorted(stage.rglob("*")) if p.is_file()}
             self.require_free(fresh)
             # Both are listed while they change places, so that a kill leaves no file that is nobody's.
             self._list({**self._files, **{n: [*self._files.get(n, []), digest] for n, digest in fresh.items()}})
@@ -90,7 +90,7 @@ class ReportFolder:
 
     def _is_own(self, name: str) -> bool:
         path = self.folder / name
-        return path.is_file() and _digest(path) in self._files.get(name, [])
+        return path.is_file() and file_digest(path) in self._files.get(name, [])
 
     def _list(self, files: dict[str, list[str]]) -> None:
         self._files = files
@@ -98,6 +98,7 @@ class ReportFolder:
         write_whole(self.folder / LIST, json.dumps(listed.model_dump(), indent=1) + "\n")
 
 
-def _digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Return the digest (SHA-256) of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,13 +1,12 @@
 """What the video grid of a page shows, written beside it: its videos may be gone when the page is made again."""
 
-import hashlib
 import json
 from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict
 
 from lerobot_excav.datasets.format.validated import validated_file
-from lerobot_excav.evaluation.report_folder import ReportFolder
+from lerobot_excav.evaluation.report_folder import ReportFolder, file_digest
 from lerobot_excav.evaluation.result_page.contents import Clips
 from lerobot_excav.evaluation.result_page.page import ResultPage
 
@@ -71,7 +70,7 @@ def is_of_earlier_metrics(shown: ShownClips, page: ResultPage) -> bool:
 def _digest(page: ResultPage, label: str) -> str | None:
     """Return the digest of the metrics that the videos of a row are of, those of its first seed; None if not played."""
     path = next((row.parts[0][1].path for row in page.rows if row.row.label == label), None)
-    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    return None if path is None else file_digest(path)
 
 
 def _episodes(clips: Sequence[Clips]) -> set[tuple[str, int]]:

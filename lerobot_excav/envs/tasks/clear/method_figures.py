@@ -86,8 +86,9 @@ def draw_same_pile(methods: Methods, path: Path) -> None:
         figure.text(0.5, 0.5, "No pile was cleared by all of them.", ha="center")
     else:
         panels = figure.subplots(1, len(methods), squeeze=False)[0]
+        shown = min(shared)
         for axes, (name, piles) in zip(panels, methods.items(), strict=True):
-            first, *others = [pile for pile in piles if _at_first(pile) == min(shared)]
+            first, *others = [pile for pile in piles if _at_first(pile) == shown]
             draw_cuts(axes, first)
             which = f", first of {1 + len(others)} trainings" if others else ""
             axes.set_title(f"{name}{which}\n{axes.get_title()}", fontsize=8)
