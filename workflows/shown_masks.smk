@@ -2,6 +2,8 @@
 
 CONDITIONS = {name: f"--env.mask_condition={name}" for name in ("zero", "random", "mismatched")}
 DROPOUTS = {f"dropout_{percent}": f"--env.mask_dropout={percent / 100}" for percent in (20, 50)}
+# As before the policy held the last mask while the next ones are empty.
+UNHELD = {f"unheld_{row}": f"{flags} --policy.hold_mask_frames=0" for row, flags in DROPOUTS.items()}
 
 
 def noises(sizes_px):

@@ -211,6 +211,8 @@ POLICY = {
     "augment_shift_px": whole(0, 1024),
     "augment_mask_px": whole(0, 1024),
     "mask_shape": one_of("region", "box", "point"),
+    "hold_mask_frames": whole(0, 10_000),
+    "replan_iou": number(above=0, high=1),
     "compare_masks": flag,
     "backtrack_frames": whole(0, 10_000),
     "backtrack_stride": whole(1, 100).beside(backtrack_frames=5),

@@ -9,6 +9,10 @@ TARGET_MASK_KEY = "observation.images.target_mask"
 MAIN_CAMERA_KEY = "observation.images.main"
 """Camera that the mask belongs to where a policy has one of this name and none is chosen."""
 
+HOLD_FRAMES = 20
+"""For how long the last mask is used where the next ones are empty [frames] (kind: guess: of masks of which half are
+missing, no more than one in a million is the last of so many; on the excavator it is 2 s)."""
+
 
 @dataclass
 class MaskInput:
@@ -36,6 +40,20 @@ class MaskInput:
         "Show the backbone the row and column of every pixel as two more channels, so that the plain fourth channel "
         "can tell where it lies",
         default=False,
+    )
+    hold_mask_frames: int = setting(
+        "While the mask is empty, act on the last one that was not, for so many frames in a row at most; 0 acts on "
+        "empty masks, which show no target [frames]",
+        default=HOLD_FRAMES,
+        low=0,
+        high=10_000,
+    )
+    replan_iou: float = setting(
+        "Keep a plan while the mask overlaps with the one it was made for by at least this much (intersection over "
+        "union); 1 plans again at every pixel that changes. For long plans and masks that flicker",
+        default=1.0,
+        above=0.0,
+        high=1.0,
     )
     crop: list[int] | None = setting(
         "Top, left, height and width of the part of the main picture and its mask that is used [px]; left out: all",

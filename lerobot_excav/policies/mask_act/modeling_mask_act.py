@@ -16,11 +16,13 @@ from lerobot_excav.policies.mask_act.checkpoint import PROCESSORS, load_weights,
 from lerobot_excav.policies.mask_act.command_changes import CommandChanges
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig, resolved
 from lerobot_excav.policies.mask_act.framing import framed
+from lerobot_excav.policies.mask_act.held_mask import HeldMask
 from lerobot_excav.policies.mask_act.mask_shape import shaped
 from lerobot_excav.policies.mask_act.mask_shift import shift_alone
 from lerobot_excav.policies.mask_act.network import Demonstration, Latent, MaskACTNetwork
-from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TargetWatch, TemporalEnsembles
+from lerobot_excav.policies.mask_act.pending_actions import ActionQueue, TemporalEnsembles
 from lerobot_excav.policies.mask_act.picture_shift import shift_together
+from lerobot_excav.policies.mask_act.target_watch import TargetWatch
 from lerobot_excav.policies.mask_act.training_masks import TrainingMasks, require_statistics
 from lerobot_excav.policies.mask_act.views import Batch, masked_views, pictures, target_mask
 from lerobot_excav.policies.mask_act.way_back import WayBack
@@ -65,7 +67,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
         self._training_masks = TrainingMasks(config, meta)
         self._command_changes = CommandChanges(meta)
         self.model = MaskACTNetwork(config)
-        self._watch = TargetWatch()
+        self._held = HeldMask(config.hold_mask_frames)
+        self._watch = TargetWatch(config.replan_iou)
         self._way_back = WayBack(config.backtrack_frames, config.backtrack_stride)
         # LeRobot's `drop_queued_actions` clears what has this name.
         self._action_queue = (
@@ -106,7 +109,8 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
 
     def reset(self) -> None:
         """Forget plans and targets; call it whenever the environments are reset."""
-        self._watch.reset()
+        self._held.clear()
+        self._watch.clear()
         self._way_back.clear()
         self._action_queue.clear()
 
@@ -159,9 +163,10 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
     def select_action(self, batch: Batch, **kwargs: Any) -> Tensor:
         """Return the next action of each environment, float32, shape (B, A), normalised.
 
-        An environment gets a new plan when its plan has run out or its mask has changed. The other environments keep
-        their plans. With `backtrack_frames`, one whose mask shows another target goes back the way it
-        has come before that.
+        An environment gets a new plan when its plan has run out, or when its mask shows another target than the plan's
+        (`replan_iou`). The other environments keep their plans. An empty mask is replaced by the last one that was not
+        (`hold_mask_frames`). With `backtrack_frames`, one whose mask shows another target goes back the way it has come
+        before that.
 
         Args:
             batch: Observations of all environments.
@@ -172,20 +177,24 @@ class MaskACTPolicy(ACTPolicy):  # type: ignore[misc]  # LeRobot's classes are u
                 environments changed without `reset`.
         """
         self.eval()
-        mask = target_mask(self.config, batch)
+        mask = self._held.filled(target_mask(self.config, batch))
+        batch = {**batch, self.config.mask_key: mask}
         changed = self._watch.changed(mask)
         if not self.config.backtrack_frames:
             return self._planned(batch, changed)
-        arrived = self._way_back.look(mask, changed).to(changed.device)
+        arrived = self._way_back.look(mask).to(changed.device)
         changed = (changed & ~self._way_back.is_leading.to(changed.device)) | arrived
         return self._way_back.led(self._planned(batch, changed))
 
     def _planned(self, batch: Batch, changed: Tensor) -> Tensor:
         """Return the next action of each environment's plan, a new one where its target has `changed`."""
+        mask: Tensor = batch[self.config.mask_key]
         if isinstance(self._action_queue, TemporalEnsembles):
+            self._watch.planned(torch.ones_like(changed), mask)
             return self._action_queue.update(self.predict_action_chunk(batch), changed)
         stale = self._action_queue.stale(changed)
         if stale.any():
+            self._watch.planned(stale, mask)
             self._action_queue.put(stale, self.predict_action_chunk(rows(batch, stale)))
         return self._action_queue.pop()
 

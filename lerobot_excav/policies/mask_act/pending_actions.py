@@ -10,33 +10,6 @@ from torch import Tensor
 from lerobot_excav.errors import require
 
 
-class TargetWatch:
-    """Notice in which environments the target mask has changed since the last step."""
-
-    def __init__(self) -> None:
-        self._mask: Tensor | None = None
-
-    def reset(self) -> None:
-        """Forget the masks; the next ones count as changed."""
-        self._mask = None
-
-    def changed(self, mask: Tensor) -> Tensor:
-        """Return which masks, (B, 1, H, W), differ from the last ones or had none before, bool (B,), and remember them.
-
-        Raises:
-            ConfigurationError: The batch has another size than at the last step.
-        """
-        last, self._mask = self._mask, mask
-        if last is None:
-            return torch.ones(mask.shape[0], dtype=torch.bool, device=mask.device)
-        require(
-            last.shape == mask.shape,
-            f"masks of shape {tuple(mask.shape)} follow masks of shape {tuple(last.shape)}: the batch of "
-            "environments changed during a rollout. Call policy.reset() between rollouts.",
-        )
-        return (last != mask).flatten(1).any(dim=1)
-
-
 class ActionQueue:
     """Planned actions of a batch of environments, each at its own place in its plan of `n_action_steps`."""
 

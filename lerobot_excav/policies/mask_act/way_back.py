@@ -33,25 +33,25 @@ class WayBack:
         self._led: list[deque[Tensor]] = []
         self._has_arrived: list[bool] = []
         self._still_frames: list[int] = []
-        self._mask: Tensor | None = None
+        self._mask: Tensor | None = None  # the last one of each that showed a target
+        self._last: Tensor | None = None
 
     @property
     def is_leading(self) -> Tensor:
         """Which environments are on their way back, bool (B,); meanwhile their masks are not looked at."""
         return torch.tensor([bool(led) for led in self._led], dtype=torch.bool)
 
-    def look(self, mask: Tensor, changed: Tensor) -> Tensor:
+    def look(self, mask: Tensor) -> Tensor:
         """Begin the way back where a mask, (B, 1, H, W), shows another target.
 
         Args:
             mask: Those of this frame.
-            changed: Which of them are others than in the frame before, bool (B,).
 
         Returns:
             Which environments have come to the end of their way back, and need a plan from there, bool (B,).
         """
-        if self._mask is None:
-            self._mask, changed = mask.clone(), torch.zeros_like(changed)  # the first ones are no change
+        if self._mask is None or self._last is None:
+            self._mask, self._last = mask.clone(), mask  # the first ones are no change
             self._ways, self._led = [[] for _ in mask], [deque() for _ in mask]
             self._has_arrived, self._still_frames = [False for _ in mask], [0 for _ in mask]
         shown = mask.flatten(1).any(dim=1)
@@ -64,8 +64,9 @@ class WayBack:
                 if len(way) <= self._most_frames and self._still_frames[number] >= STILL_FRAMES:
                     self._led[number] = deque(way[:: self._stride][::-1])
                 self._ways[number] = []
-        counts = zip(self._still_frames, changed.tolist(), strict=True)
+        counts = zip(self._still_frames, (mask != self._last).flatten(1).any(dim=1).tolist(), strict=True)
         self._still_frames = [0 if is_new else count + 1 for count, is_new in counts]
+        self._last = mask
         arrived, self._has_arrived = torch.tensor(self._has_arrived), [False for _ in self._has_arrived]
         return arrived
 

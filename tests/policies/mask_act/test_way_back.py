@@ -148,8 +148,7 @@ def test_the_way_back_ends_where_the_way_began_whatever_is_shown(places):
         mask = torch.zeros(1, 1, 1, 3)
         if place is not None:
             mask[..., place] = 1.0
-        changed = number == 0 or place != places[number - 1]
-        has_arrived = bool(way_back.look(mask, torch.tensor([changed])))
+        has_arrived = bool(way_back.look(mask))
         is_leading = bool(way_back.is_leading)
         assert has_arrived is (was_leading and not is_leading)
         played = int(way_back.led(torch.tensor([[float(number)]])))
