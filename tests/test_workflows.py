@@ -7,6 +7,7 @@ import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 45, "test": 45, "checkpoint": 1}
+    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 48, "test": 48, "checkpoint": 1}
     stages |= {"audit": 1, "report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
@@ -97,6 +98,17 @@ def test_every_stage_of_the_excavator_is_planned(dig_plan):
     stages = {"data_shard": 5, "data": 5, "slim": 5, "train": 17, "checkpoint": 17, "operator": 9}
     stages |= {"play_shard": 360, "play": 60, "audit": 1, "report": 1, "all": 1}
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
+
+
+def test_only_what_the_page_of_the_arm_shows_is_drawn(plan):
+    drawn = [
+        " ".join(words)
+        for words in commands(plan)
+        if words[0] == "lerobot-eval" and "--env.render_every=1000" not in words
+    ]
+    clips = tomllib.loads(SNAKEFILE.with_name("rows.toml").read_text(encoding="utf-8"))["clips"]
+    assert len(drawn) == len(clips)
+    assert all(any(f"/{clip['label']}/" in command for command in drawn) for clip in clips)
 
 
 NAMES_OF_PARTS = ("out", "workers", "output_dir", "env.metrics_path", "env.render_every")  # differ from part to part
