@@ -24,7 +24,7 @@ from lerobot_excav.policies.mask_act.features import (
 )
 from lerobot_excav.policies.mask_act.framing import require_framing
 from lerobot_excav.policies.mask_act.fused_adamw import FusedAdamWConfig
-from lerobot_excav.policies.mask_act.mask_input import HOLD_FRAMES, MAIN_CAMERA_KEY, TARGET_MASK_KEY, MaskInput
+from lerobot_excav.policies.mask_act.mask_input import MAIN_CAMERA_KEY, TARGET_MASK_KEY, MaskInput
 from lerobot_excav.policies.mask_act.mask_shape import MASK_SHAPES
 from lerobot_excav.policies.mask_act.presets import DEFAULT_PRESET, PRESETS, differences
 from lerobot_excav.setting import check_settings, setting
@@ -306,13 +306,8 @@ class MaskACTConfig(MaskInput, ACTConfig):  # type: ignore[misc]  # LeRobot's cl
                 f"out of view; allowed: 0 to {min(main_shape[1:]) - 1}, and useful are a few pixels.",
             )
         if self.withhold_mask:
-            neutral = {
-                "augment_mask_px": 0,
-                "mask_shape": MASK_SHAPES[0],
-                "hold_mask_frames": HOLD_FRAMES,
-                "replan_iou": 1,
-            }
-            changes = {name: (getattr(self, name), value) for name, value in neutral.items()}
+            # How masks are held and compared is left alone: a checkpoint that says so may be asked to act without one.
+            changes = {"augment_mask_px": (self.augment_mask_px, 0), "mask_shape": (self.mask_shape, MASK_SHAPES[0])}
             require_shown(withheld="withhold_mask", **changes)
         if self.withhold_pictures:
             require_shown(withheld="withhold_pictures", augment_shift_px=(self.augment_shift_px, 0))

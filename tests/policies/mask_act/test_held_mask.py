@@ -2,12 +2,10 @@
 
 import logging
 
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.held_mask import HeldMask
 
 from .conftest import MASK
@@ -84,6 +82,17 @@ def test_after_a_reset_no_mask_of_the_last_rollout_is_held(awake, batch):
     torch.testing.assert_close(play(agent, blind, 4), agent.predict_action_chunk(blind)[0, :4], rtol=1e-5, atol=1e-5)
 
 
-def test_a_setting_of_holding_without_effect_is_refused(policy):
-    with pytest.raises(ConfigurationError, match=r"hold_mask_frames=5 has no effect with policy\.withhold_mask=true"):
-        policy(hold_mask_frames=5, withhold_mask=True)
+def test_a_policy_that_holds_masks_can_be_asked_to_act_without_any(policy, batch):
+    """Its checkpoint says how masks are held and compared, and `--policy.withhold_mask=true` is given beside."""
+    settings, seen = {"withhold_mask": True, "n_action_steps": 4}, batch(batch_size=1)
+    plain, steady = policy(**settings), policy(**settings, hold_mask_frames=5, replan_iou=0.5)
+    torch.testing.assert_close(play(steady, seen, 6), play(plain, seen, 6), rtol=0, atol=0)
+
+
+def test_the_way_back_does_not_begin_again_after_a_gap_of_the_mask(awake, batch):
+    seen, played = batch(batch_size=2), []
+    for has_gap in (False, True):
+        agent = awake(n_action_steps=4, backtrack_frames=20)
+        gap = {**seen, MASK: seen[MASK] * torch.tensor([1.0, 0.0 if has_gap else 1.0])[:, None, None, None]}
+        played.append(torch.cat([play(agent, seen, 7), play(agent, gap, 3), play(agent, seen, 3)]))
+    torch.testing.assert_close(*played, rtol=0, atol=0)

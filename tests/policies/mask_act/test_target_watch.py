@@ -5,7 +5,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lerobot_excav.errors import ConfigurationError
 from lerobot_excav.policies.mask_act.target_watch import TargetWatch
 
 from .conftest import MASK, square_mask
@@ -75,10 +74,3 @@ def test_a_policy_keeps_its_plan_while_its_mask_jitters(awake, batch, iou, plans
         observation[MASK] = square_mask(1, top=8 + step % 2, left=16)
         agent.select_action(observation)
     assert len(made) == plans
-
-
-def test_a_setting_of_replanning_without_effect_is_refused(policy):
-    with pytest.raises(
-        ConfigurationError, match=r"replan_iou=0.5 has no effect with policy\.withhold_mask=true; give 1"
-    ):
-        policy(replan_iou=0.5, withhold_mask=True)
