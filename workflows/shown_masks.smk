@@ -1,4 +1,4 @@
-"""What a row shows a policy in place of its correct mask: flags of the environment, by the name of the row."""
+"""What a row shows a policy in place of its correct mask: flags of `lerobot-eval`, by the name of the row."""
 
 CONDITIONS = {name: f"--env.mask_condition={name}" for name in ("zero", "random", "mismatched")}
 DROPOUTS = {f"dropout_{percent}": f"--env.mask_dropout={percent / 100}" for percent in (20, 50)}
