@@ -9,7 +9,7 @@ from lerobot_excav.envs.machines.excavator.constants import JOINT_ACCEL_RAD_S2, 
 
 Array = NDArray[np.float64]
 
-_ACCEL_RAD_S2 = 0.9 * np.asarray(JOINT_ACCEL_RAD_S2)
+ACCEL_RAD_S2 = 0.9 * np.asarray(JOINT_ACCEL_RAD_S2)
 """What is used of the rated accelerations: a hand corrects with the rest (kind: tuned)."""
 _BEND_SHARE = 0.8
 """Greatest part of the acceleration that goes into a bend of the path (kind: tuned)."""
@@ -33,7 +33,7 @@ class JointMotion:
         steps_s = np.maximum(np.max(np.abs(np.diff(self._path, axis=0)) / limit, axis=1), 1e-6)
         self._clock_s = np.concatenate([[0.0], np.cumsum(steps_s)])
         peak_speed = np.max(np.abs(np.diff(self._path, axis=0)) / steps_s[:, None], axis=0)
-        ramp_s = float(np.max(peak_speed / (0.9 * np.asarray(JOINT_ACCEL_RAD_S2))))
+        ramp_s = float(np.max(peak_speed / ACCEL_RAD_S2))
         span_s = float(self._clock_s[-1])
         # A path shorter than its ramps never gets to full speed: shrink both ramps alike (triangular profile).
         self._top = min(1.0, float(np.sqrt(span_s / ramp_s)))
@@ -122,10 +122,10 @@ def _paces(slopes: Array, steps_s: Array) -> Array:
     """
     bends = np.abs(np.diff(slopes, axis=0)) / (0.5 * (steps_s[1:] + steps_s[:-1]))[:, None]
     # What a bend leaves of the acceleration is there to change the pace.
-    most = np.min(_BEND_SHARE * _ACCEL_RAD_S2 / np.maximum(bends, 1e-9), axis=1)
+    most = np.min(_BEND_SHARE * ACCEL_RAD_S2 / np.maximum(bends, 1e-9), axis=1)
     squares = np.minimum(1.0, np.concatenate([[0.0], most, [0.0]]))
     bends = np.concatenate([np.zeros((1, 4)), bends, np.zeros((1, 4))])
-    left = _ACCEL_RAD_S2 - bends * squares[:, None]
+    left = ACCEL_RAD_S2 - bends * squares[:, None]
     gains = 2.0 * steps_s * np.min(np.minimum(left[1:], left[:-1]) / np.maximum(np.abs(slopes), 1e-9), axis=1)
     for k in range(len(steps_s)):
         squares[k + 1] = min(squares[k + 1], squares[k] + gains[k])

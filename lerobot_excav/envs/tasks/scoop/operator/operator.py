@@ -7,6 +7,7 @@ from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG
 from lerobot_excav.envs.tasks.scoop.operator.dig import plan_dig
 from lerobot_excav.envs.tasks.scoop.operator.motion import CarefulMotion, JointMotion
+from lerobot_excav.envs.tasks.scoop.operator.moving_start import Motion, MovingStart
 from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_dump, plan_lift
 from lerobot_excav.envs.tasks.scoop.operator.reach import bucket_pose, joint_pos_near
 from lerobot_excav.envs.tasks.scoop.operator.sight import Sight
@@ -63,9 +64,11 @@ class DigOperator:
 
     def act(self, env: Sight) -> NDArray[np.float32]:
         """Return the joystick command for the next frame: swing, boom, arm, bucket in [-1, 1], (4,) float32."""
-        is_other_target = env.cycle.target_id != self._target_id and self.phase in ("reach", "cut", "rest")
-        if env.cycle is not self._cycle or is_other_target:
+        is_other_target = env.cycle.target_id != self._target_id
+        if env.cycle is not self._cycle or (is_other_target and self.done):
             self.reset(env)
+        elif is_other_target and self.phase in ("reach", "cut"):
+            self._turn_to_other_target(env)
         joint_pos = env.worksite.machine.joint_pos
         if self._phase_is_over(joint_pos, env):
             self._begin(self._phase + 1, env)
@@ -89,7 +92,19 @@ class DigOperator:
             joint_pos = env.worksite.machine.joint_pos
             is_careful = self.phase == "cut" and self._dig.is_scrape
             motion = CarefulMotion if is_careful else JointMotion
-            self._motion = motion(self._joint_path(joint_pos), speed=self._variation.speed)
+            self._motion: Motion = motion(self._joint_path(joint_pos), speed=self._variation.speed)
+
+    def _turn_to_other_target(self, env: Sight) -> None:
+        """Plan again from where the machine is, and from how fast it moves there."""
+        self._target_id = env.cycle.target_id
+        self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
+        self._phase, self._time_s = 0, 0.0
+        machine = env.worksite.machine
+
+        def reach(joint_pos: NDArray[np.float64]) -> JointMotion:
+            return JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
+
+        self._motion = MovingStart(machine.joint_pos, machine.joint_vel, reach)
 
     def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Plan the present phase's path from a joint position."""
