@@ -24,7 +24,7 @@ class JointMotion:
     The path is first timed so that the busiest joint runs at full speed, then its clock is started and stopped
     with a ramp long enough for the slowest joint to accelerate. Where the path bends, a joint that has to turn round
     falls behind; the bucket cuts the corner, by centimetres to decimetres. The path is (n, 4) [rad], n >= 2; `speed` is
-    the fraction of the machine's speeds to use.
+    the fraction of the machine's speeds to use. From `slows_down_s` on its clock runs slower and slower.
     """
 
     def __init__(self, path: Sequence[Array] | Array, *, speed: float) -> None:
@@ -39,6 +39,7 @@ class JointMotion:
         self._top = min(1.0, float(np.sqrt(span_s / ramp_s)))
         self._ramp_s = ramp_s * self._top
         self.duration_s = span_s / self._top + self._ramp_s
+        self.slows_down_s = self.duration_s - self._ramp_s
 
     def at(self, time_s: float) -> tuple[Array, Array]:
         """Return wanted joint positions [rad] and velocities [rad/s] at a time, each shape (4,)."""

@@ -1,35 +1,22 @@
 """A motion that begins while the machine is still moving."""
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lerobot_excav.envs.tasks.scoop.operator.motion import ACCEL_RAD_S2
+from lerobot_excav.envs.tasks.scoop.operator.motion import ACCEL_RAD_S2, JointMotion
 
 Array = NDArray[np.float64]
-
-
-class Motion(Protocol):
-    """How joints run through a path in time, from rest to rest."""
-
-    duration_s: float
-
-    @property
-    def end(self) -> Array:
-        """Joint positions at the end of the path [rad], shape (4,)."""
-
-    def at(self, time_s: float) -> tuple[Array, Array]:
-        """Return wanted joint positions [rad] and velocities [rad/s] at a time, each shape (4,)."""
 
 
 class MovingStart:
     """A motion from wherever the machine would come to rest, laid over its coming to rest.
 
-    A joint that goes on in its direction slows down in one half of the sum while it speeds up in the other: it keeps
-    its speed. Where a joint has to turn round, the motion waits until that joint stands, or the sum would ask for twice
-    the rated acceleration, and the machine would overshoot.
+    A joint that goes on in its direction slows down in one part of the sum while it speeds up in the other: it keeps
+    its speed. Where both would pull the same way, the sum asks for twice the rated acceleration, and the machine would
+    overshoot. So the motion waits until a joint stands that has to turn round, and long enough that none is still
+    coming to rest when the motion slows down.
 
     Args:
         joint_pos: Where the joints are, (4,) [rad].
@@ -37,13 +24,14 @@ class MovingStart:
         motion_from: Plans the motion from joint positions (4,) [rad] at which the machine rests.
     """
 
-    def __init__(self, joint_pos: Array, joint_vel: Array, motion_from: Callable[[Array], Motion]) -> None:
+    def __init__(self, joint_pos: Array, joint_vel: Array, motion_from: Callable[[Array], JointMotion]) -> None:
         self._start, self._velocity = joint_pos, joint_vel
         self._braking_s = np.abs(joint_vel) / ACCEL_RAD_S2
         self._stop = joint_pos + 0.5 * joint_vel * self._braking_s
         self._motion = motion_from(self._stop)
         turns_round = joint_vel * (self._motion.end - self._stop) < 0.0
-        self._wait_s = float(np.max(self._braking_s, where=turns_round, initial=0.0))
+        speeds_up_s = np.where(turns_round, 0.0, self._motion.slows_down_s)
+        self._wait_s = float(np.max(self._braking_s - speeds_up_s, initial=0.0))
         self.duration_s = max(self._wait_s + self._motion.duration_s, float(np.max(self._braking_s)))
 
     @property

@@ -7,7 +7,7 @@ from lerobot_excav.envs.machines.excavator.constants import JOINT_SPEED_RAD_S
 from lerobot_excav.envs.tasks.scoop.cycle import LOADING_ONSET_KG
 from lerobot_excav.envs.tasks.scoop.operator.dig import plan_dig
 from lerobot_excav.envs.tasks.scoop.operator.motion import CarefulMotion, JointMotion
-from lerobot_excav.envs.tasks.scoop.operator.moving_start import Motion, MovingStart
+from lerobot_excav.envs.tasks.scoop.operator.moving_start import MovingStart
 from lerobot_excav.envs.tasks.scoop.operator.plan import plan_carry, plan_curl, plan_dump, plan_lift
 from lerobot_excav.envs.tasks.scoop.operator.reach import bucket_pose, joint_pos_near
 from lerobot_excav.envs.tasks.scoop.operator.sight import Sight
@@ -92,7 +92,9 @@ class DigOperator:
             joint_pos = env.worksite.machine.joint_pos
             is_careful = self.phase == "cut" and self._dig.is_scrape
             motion = CarefulMotion if is_careful else JointMotion
-            self._motion: Motion = motion(self._joint_path(joint_pos), speed=self._variation.speed)
+            self._motion: JointMotion | CarefulMotion | MovingStart = motion(
+                self._joint_path(joint_pos), speed=self._variation.speed
+            )
 
     def _turn_to_other_target(self, env: Sight) -> None:
         """Plan again from where the machine is, and from how fast it moves there."""
