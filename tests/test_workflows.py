@@ -23,6 +23,7 @@ from lerobot_excav.envs.tasks.scoop.spec import SCOOP
 from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
 from lerobot_excav.evaluation.result_page.contents import read_contents
+from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.scripts.arguments import parse_arguments
 
 from .evaluation.conftest import SCOOP as SCOOP_LINE
@@ -83,9 +84,11 @@ def parse(words):
     elif program == "lerobot-edit-dataset":
         draccus.parse(EditDatasetConfig, args=options)
     else:
-        # LeRobot itself reads --policy.* from the checkpoint, which is not there yet.
+        # LeRobot itself reads the policy from the checkpoint, which is not there yet.
         assert any(option.startswith("--policy.path=") for option in options)
         draccus.parse(EvalPipelineConfig, args=[o for o in options if not o.startswith("--policy.")])
+        of_policy = [o.removeprefix("--policy.") for o in options if o.startswith("--policy.")]
+        draccus.parse(MaskACTConfig, args=[f"--{o}" for o in of_policy if not o.startswith("path=")])
 
 
 def test_every_stage_is_planned(plan):
