@@ -21,6 +21,8 @@ TRACKING_TIME_S = 0.3
 ARRIVAL_TOLERANCE_RAD = 0.04
 OVERTIME_S = 0.8
 """How long to wait for the machine after a motion should have ended [s], for instance when the bucket stalls."""
+AT_REST_RAD_S = 0.01
+"""Speed of a joint below which it stands [rad/s]; after a pause it has less than 1e-5 (kind: derived)."""
 FULL_KG = 470.0
 """Payload at which the cut is broken off [kg]."""
 
@@ -85,28 +87,30 @@ class DigOperator:
         return np.asarray(command, dtype=np.float32)
 
     def _begin(self, phase: int, env: Sight) -> None:
-        """Start a phase from where the machine is, after the style's pause."""
+        """Start a phase from where the machine is, after the style's pause; a way that begins in motion has none."""
         self._phase = phase
         self._time_s = -self._variation.pauses_s[phase]
-        if not self.done:
-            joint_pos = env.worksite.machine.joint_pos
-            is_careful = self.phase == "cut" and self._dig.is_scrape
-            motion = CarefulMotion if is_careful else JointMotion
-            self._motion: JointMotion | CarefulMotion | MovingStart = motion(
-                self._joint_path(joint_pos), speed=self._variation.speed
-            )
+        if self.done:
+            return
+        machine = env.worksite.machine
+        is_careful = self.phase == "cut" and self._dig.is_scrape
+        motion = CarefulMotion if is_careful else JointMotion
+        self._motion: JointMotion | CarefulMotion | MovingStart
+        if self.phase == "reach" and np.abs(machine.joint_vel).max() > AT_REST_RAD_S:
+            self._time_s = 0.0
+            self._motion = MovingStart(machine.joint_pos, machine.joint_vel, self._reach_from)
+        else:
+            self._motion = motion(self._joint_path(machine.joint_pos), speed=self._variation.speed)
+
+    def _reach_from(self, joint_pos: NDArray[np.float64]) -> JointMotion:
+        """Plan the way to the region from a joint position at which the machine rests."""
+        return JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
 
     def _turn_to_other_target(self, env: Sight) -> None:
-        """Plan again from where the machine is, and from how fast it moves there."""
+        """Plan another way in the same style, from where the machine is."""
         self._target_id = env.cycle.target_id
         self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
-        self._phase, self._time_s = 0, 0.0
-        machine = env.worksite.machine
-
-        def reach(joint_pos: NDArray[np.float64]) -> JointMotion:
-            return JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
-
-        self._motion = MovingStart(machine.joint_pos, machine.joint_vel, reach)
+        self._begin(0, env)
 
     def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Plan the present phase's path from a joint position."""

@@ -74,6 +74,22 @@ def test_another_target_farther_on_the_way_is_not_swung_past(frame, scene_id, fi
     assert beyond.max() < 0.15  # the edge enters up to 0.02 beside the middle, and without a change it swings 0.06 past
 
 
+@pytest.mark.parametrize("target_id", [1, 3])
+def test_an_operator_that_takes_over_a_swinging_machine_does_not_swing_past_the_region(target_id):
+    """As where a policy has begun to swing back before the next region is commanded."""
+    env = ExcavatorEnv(scene_set="val", obs_type="agent_pos")
+    env.reset(options={"scene_id": 1, "target_id": target_id})
+    for _ in range(9):
+        env.step(np.array([-1.0, 0.0, 0.0, 0.0], np.float32))
+    operator = DigOperator(rng=np.random.default_rng(0))
+    operator.reset(env)
+    swings = []
+    while operator.phase == "reach":
+        env.step(operator.act(env))
+        swings.append(float(env.worksite.machine.joint_pos[0]))
+    assert cylinder_from_world(env.cycle.target.center_w)[1] - min(swings) < 0.15
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", [8, 22])
 @pytest.mark.parametrize(("scene_id", "first"), [(2, 0), (5, 1), (5, 3), (6, 2)])
