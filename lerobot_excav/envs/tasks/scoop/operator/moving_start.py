@@ -25,11 +25,11 @@ class MovingStart:
     """
 
     def __init__(self, joint_pos: Array, joint_vel: Array, motion_from: Callable[[Array], JointMotion]) -> None:
-        self._start, self._velocity = joint_pos, joint_vel
+        self._deceleration = np.sign(joint_vel) * ACCEL_RAD_S2
         self._braking_s = np.abs(joint_vel) / ACCEL_RAD_S2
-        self._stop = joint_pos + 0.5 * joint_vel * self._braking_s
-        self._motion = motion_from(self._stop)
-        turns_round = joint_vel * (self._motion.end - self._stop) < 0.0
+        stop = joint_pos + 0.5 * joint_vel * self._braking_s
+        self._motion = motion_from(stop)
+        turns_round = joint_vel * (self._motion.end - stop) < 0.0
         speeds_up_s = np.where(turns_round, 0.0, self._motion.slows_down_s)
         self._wait_s = float(np.max(self._braking_s - speeds_up_s, initial=0.0))
         self.duration_s = max(self._wait_s + self._motion.duration_s, float(np.max(self._braking_s)))
@@ -43,5 +43,4 @@ class MovingStart:
         """Return wanted joint positions [rad] and velocities [rad/s] at a time, each shape (4,)."""
         position, velocity = self._motion.at(time_s - self._wait_s)
         left_s = np.maximum(self._braking_s - max(time_s, 0.0), 0.0)
-        deceleration = np.sign(self._velocity) * ACCEL_RAD_S2
-        return position - 0.5 * deceleration * left_s**2, velocity + deceleration * left_s
+        return position - 0.5 * self._deceleration * left_s**2, velocity + self._deceleration * left_s

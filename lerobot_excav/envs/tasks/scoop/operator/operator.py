@@ -44,9 +44,8 @@ class DigOperator:
         """Begin the running cycle of an environment with a newly drawn style."""
         self._variation: Variation = draw_variation(self._rng, phase_count=len(PHASES))
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
-        self._cycle, self._target_id = env.cycle, env.cycle.target_id
-        self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
-        self._begin(0, env)
+        self._cycle = env.cycle
+        self._plan(env)
         self._approach_s = self._motion.duration_s - self._time_s  # the pause before it counts
 
     @property
@@ -70,7 +69,7 @@ class DigOperator:
         if env.cycle is not self._cycle or (is_other_target and self.done):
             self.reset(env)
         elif is_other_target and self.phase in ("reach", "cut"):
-            self._turn_to_other_target(env)
+            self._plan(env)
         joint_pos = env.worksite.machine.joint_pos
         if self._phase_is_over(joint_pos, env):
             self._begin(self._phase + 1, env)
@@ -86,6 +85,12 @@ class DigOperator:
         command = np.clip(rate / np.asarray(JOINT_SPEED_RAD_S) + tremor, -1.0, 1.0)
         return np.asarray(command, dtype=np.float32)
 
+    def _plan(self, env: Sight) -> None:
+        """Plan how to dig the commanded target in the present style, from where the machine is."""
+        self._target_id = env.cycle.target_id
+        self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
+        self._begin(0, env)
+
     def _begin(self, phase: int, env: Sight) -> None:
         """Start a phase from where the machine is, after the style's pause; a way that begins in motion has none."""
         self._phase = phase
@@ -93,24 +98,18 @@ class DigOperator:
         if self.done:
             return
         machine = env.worksite.machine
-        is_careful = self.phase == "cut" and self._dig.is_scrape
-        motion = CarefulMotion if is_careful else JointMotion
         self._motion: JointMotion | CarefulMotion | MovingStart
-        if self.phase == "reach" and np.abs(machine.joint_vel).max() > AT_REST_RAD_S:
+        if self.phase == "cut" and self._dig.is_scrape:
+            self._motion = CarefulMotion(self._joint_path(machine.joint_pos), speed=self._variation.speed)
+        elif self.phase == "reach" and np.abs(machine.joint_vel).max() > AT_REST_RAD_S:
             self._time_s = 0.0
-            self._motion = MovingStart(machine.joint_pos, machine.joint_vel, self._reach_from)
+            self._motion = MovingStart(machine.joint_pos, machine.joint_vel, self._brisk_motion_from)
         else:
-            self._motion = motion(self._joint_path(machine.joint_pos), speed=self._variation.speed)
+            self._motion = self._brisk_motion_from(machine.joint_pos)
 
-    def _reach_from(self, joint_pos: NDArray[np.float64]) -> JointMotion:
-        """Plan the way to the region from a joint position at which the machine rests."""
+    def _brisk_motion_from(self, joint_pos: NDArray[np.float64]) -> JointMotion:
+        """Plan the motion of the present phase from a joint position at which the machine rests."""
         return JointMotion(self._joint_path(joint_pos), speed=self._variation.speed)
-
-    def _turn_to_other_target(self, env: Sight) -> None:
-        """Plan another way in the same style, from where the machine is."""
-        self._target_id = env.cycle.target_id
-        self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
-        self._begin(0, env)
 
     def _joint_path(self, joint_pos: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Plan the present phase's path from a joint position."""

@@ -10,6 +10,8 @@ from lerobot_excav.envs.tasks.scoop.operator import DigOperator
 from lerobot_excav.envs.tasks.scoop.operator.motion import JointMotion
 from lerobot_excav.envs.tasks.scoop.operator.moving_start import MovingStart
 
+from .conftest import drive
+
 SHARES = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(4)))
 GOAL = np.array([0.4, 0.3, -1.6, -0.7])
 
@@ -51,25 +53,26 @@ def test_a_joint_that_goes_on_in_its_direction_does_not_slow_down():
     assert min(speeds) >= velocity[0] - 0.01
 
 
-def swing_after(frame, *, scene_id, first, second):
-    """Command another region before a frame; return swing angles from there to the cut, and the region's."""
-    env = ExcavatorEnv(scene_set="val", obs_type="agent_pos")
-    env.reset(options={"scene_id": scene_id, "target_id": first})
-    operator = DigOperator(rng=np.random.default_rng(scene_id))
+def swings_of_reach(env, *, seed, commands=()):
+    """Let an operator reach for its region, others commanded before some frames; return the swing angles [rad]."""
+    operator = DigOperator(rng=np.random.default_rng(seed))
     operator.reset(env)
     swings = []
     while operator.phase == "reach":
-        if env.frame == frame:
-            env.recommand(second)
+        if env.frame in dict(commands):
+            env.recommand(dict(commands)[env.frame])
         env.step(operator.act(env))
         swings.append(float(env.worksite.machine.joint_pos[0]))
-    return np.array(swings[frame:]), cylinder_from_world(env.cycle.target.center_w)[1]
+    return np.array(swings)
 
 
 @pytest.mark.parametrize("frame", [6, 10])
 @pytest.mark.parametrize(("scene_id", "first", "second"), [(1, 3, 1), (2, 1, 2), (1, 2, 0)])
 def test_another_target_farther_on_the_way_is_not_swung_past(frame, scene_id, first, second):
-    swings, wanted = swing_after(frame, scene_id=scene_id, first=first, second=second)
+    env = ExcavatorEnv(scene_set="val", obs_type="agent_pos")
+    env.reset(options={"scene_id": scene_id, "target_id": first})
+    swings = swings_of_reach(env, seed=scene_id, commands=[(frame, second)])[frame:]
+    wanted = cylinder_from_world(env.cycle.target.center_w)[1]
     beyond = (wanted - swings) * np.sign(swings[0] - wanted)
     assert beyond.max() < 0.15  # the edge enters up to 0.02 beside the middle, and without a change it swings 0.06 past
 
@@ -81,13 +84,7 @@ def test_an_operator_that_takes_over_a_swinging_machine_does_not_swing_past_the_
     env.reset(options={"scene_id": 1, "target_id": target_id})
     for _ in range(9):
         env.step(np.array([-1.0, 0.0, 0.0, 0.0], np.float32))
-    operator = DigOperator(rng=np.random.default_rng(0))
-    operator.reset(env)
-    swings = []
-    while operator.phase == "reach":
-        env.step(operator.act(env))
-        swings.append(float(env.worksite.machine.joint_pos[0]))
-    assert cylinder_from_world(env.cycle.target.center_w)[1] - min(swings) < 0.15
+    assert cylinder_from_world(env.cycle.target.center_w)[1] - swings_of_reach(env, seed=0).min() < 0.15
 
 
 @pytest.mark.slow
@@ -96,11 +93,4 @@ def test_an_operator_that_takes_over_a_swinging_machine_does_not_swing_past_the_
 def test_a_region_that_is_commanded_on_the_way_is_dug(frame, scene_id, first):
     """In scenes in which the operator swung past, or took its load from beside the region."""
     env = ExcavatorEnv(scene_set="train", obs_type="agent_pos", retarget_frame=frame)
-    env.reset(options={"scene_id": scene_id, "target_id": first})
-    operator = DigOperator(rng=np.random.default_rng(0))
-    operator.reset(env)
-    over = False
-    while not over:
-        _, _, terminated, truncated, info = env.step(operator.act(env))
-        over = terminated or truncated
-    assert info["episode_metrics"]["is_success"]
+    assert drive(env, scene_id=scene_id, target_id=first, seed=0)[2]["is_success"]

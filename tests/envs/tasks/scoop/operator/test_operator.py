@@ -2,26 +2,15 @@ import numpy as np
 import pytest
 
 from lerobot_excav.envs.tasks.scoop.env import ExcavatorEnv
-from lerobot_excav.envs.tasks.scoop.operator import PHASES, DigOperator
+from lerobot_excav.envs.tasks.scoop.operator import PHASES
 from lerobot_excav.envs.tasks.scoop.operator.variation import Tremor
+
+from .conftest import drive
 
 
 @pytest.fixture(scope="module")
 def env():
     return ExcavatorEnv(scene_set="val", obs_type="agent_pos")
-
-
-def drive(env, *, scene_id, target_id, seed):
-    env.reset(options={"scene_id": scene_id, "target_id": target_id})
-    operator = DigOperator(rng=np.random.default_rng(seed))
-    operator.reset(env)
-    actions, phases, over = [], [], False
-    while not over:
-        actions.append(operator.act(env))
-        phases.append(operator.phase)
-        _, _, terminated, truncated, info = env.step(actions[-1])
-        over = terminated or truncated
-    return np.array(actions), phases, info["episode_metrics"]
 
 
 @pytest.mark.slow
