@@ -1,4 +1,4 @@
-"""A change of mind: in some episodes another target is commanded while the operator is on its way to the first."""
+"""Changes of mind: in some episodes another target is commanded while the operator is on its way to one."""
 
 from typing import Any, Self
 
@@ -13,38 +13,59 @@ from lerobot_excav.errors import require
 _STREAM = 0x7E3B  # names these random streams, so that the operator draws the same with and without changes of mind
 
 
-class ChangeOfMind:
-    """Commands another target of the start, once, at a moment drawn from the operator's way to the first.
+class ChangesOfMind:
+    """Command another target of the start, at a moment drawn from the operator's way to the one before; then again.
 
     Args:
-        rng: Draws moment and target.
+        rng: Draws moments and targets.
+        count: How many changes there are.
     """
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, count: int = 1) -> None:
         self._rng = rng
-        self._frame = 0
+        self._left = count
+        self._frame: int | None = None  # of the next change; None: not drawn, the operator has yet to find its way
 
     @classmethod
-    def drawn(cls, share: float, seed: tuple[int, ...]) -> Self | None:
-        """Return the change of mind of an episode, or None: it has one with probability `share`.
+    def drawn(cls, share: float, times: int, seed: tuple[int, ...]) -> Self | None:
+        """Return the changes of mind of an episode, or None: it has some with probability `share`.
 
         Args:
             share: 0 to 1.
+            times: How many there are at most; the number is drawn, all from 1 on alike.
             seed: Entropy of the episode.
         """
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
-        return cls(rng) if rng.random() < share else None
+        if rng.random() >= share:
+            return None
+        return cls(rng, 1 if times == 1 else int(rng.integers(1, times, endpoint=True)))
 
-    def begin(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> None:
-        """Draw the moment, once the operator knows its way: after one action at least, before it touches the target."""
-        self._frame = int(self._rng.integers(1, max(2, round(operator.approach_s * env.fps))))
-
-    def pass_frame(self, env: MaskedTaskEnv[Any, Any]) -> Seen | None:
-        """Give the new command if it is time; return what is seen under it.
+    def pass_frame(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> Seen | None:
+        """Give the next command if it is time; return what is seen under it.
 
         None stands for no change: it is not time, the start has a single target, or its mask cannot be found.
         """
-        others = env.other_commands() if env.frame == self._frame else []
+        if not self._left:
+            return None
+        if self._frame is None:
+            self._frame = env.frame + self._frames_on_the_way(env, operator)
+        if env.frame < self._frame:
+            return None
+        self._left -= 1
+        self._frame = None
+        seen = self._changed(env)
+        if seen is None:
+            self._left = 0  # the operator stays on its way, of which less is left than it says
+        return seen
+
+    def _frames_on_the_way(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> int:
+        """Draw how long the newest command holds: for an action at least, until the operator touches at most."""
+        passed = env.frame - env.command.since_frame  # the operator finds its way with its first action
+        return int(self._rng.integers(1, max(2, round(operator.approach_s * env.fps)))) - passed
+
+    def _changed(self, env: MaskedTaskEnv[Any, Any]) -> Seen | None:
+        """Command a target other than the present one."""
+        others = env.other_commands()
         if not others:
             return None
         target_id = others[int(self._rng.integers(len(others)))].target_id

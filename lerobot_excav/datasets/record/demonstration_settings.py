@@ -16,6 +16,7 @@ from lerobot_excav.errors import ConfigurationError, require, require_choice, sh
 from lerobot_excav.setting import check_settings, declared_settings, setting
 
 MOST_SCENES, MOST_FRAMES = 100_000, 100_000  # more is a slip of the keyboard: it would fill the memory
+MOST_CHANGES = 20  # nobody could follow more within an episode
 
 
 @dataclass(kw_only=True)
@@ -105,9 +106,9 @@ class PlayedScenes:
         return draw_stages(self.listed_stages, self.seed, SCENE_SETS.index(self.env.scene_set), scene_id)
 
     @property
-    def retarget_share(self) -> float:
-        """Share of the episodes with a change of mind."""
-        return 0.0
+    def changes_of_mind(self) -> tuple[float, int]:
+        """Share of the episodes with changes of mind, and how many those have at most."""
+        return 0.0, 1
 
     @property
     def episode_count(self) -> int:
@@ -163,6 +164,12 @@ class DemonstrationSettings(PlayedScenes):
         low=0.0,
         high=1.0,
     )
+    retarget_times: int = setting(
+        "Most changes of mind of such an episode, each on the way to the target before; how many it has is drawn",
+        default=1,
+        low=1,
+        high=MOST_CHANGES,
+    )
     keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
     stages: str = setting(
         "Stages at which every scene is shown, such as 0,4,8: after so many cycles that a seeded operator has dug "
@@ -180,6 +187,11 @@ class DemonstrationSettings(PlayedScenes):
             f"--retarget={self.retarget} has no meaning for {self.task_spec.id} with these settings: the task itself "
             "says when the command changes; leave it out",
         )
+        require(
+            self.retarget_times == 1 or self.retarget > 0.0,
+            f"--retarget_times={self.retarget_times} has no effect with --retarget=0; add the share of the episodes "
+            "that change their mind, such as --retarget=0.7",
+        )
         self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
 
     @property
@@ -188,9 +200,9 @@ class DemonstrationSettings(PlayedScenes):
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
 
     @property
-    def retarget_share(self) -> float:
-        """Share of the episodes with a change of mind."""
-        return self.retarget
+    def changes_of_mind(self) -> tuple[float, int]:
+        """Share of the episodes with changes of mind, and how many those have at most."""
+        return self.retarget, self.retarget_times
 
     def possible_pairs(self) -> list[Pair]:
         """Return the episodes that may be played, whichever targets the rule chooses."""
@@ -238,7 +250,8 @@ class DemonstrationSettings(PlayedScenes):
             f"{source} is of version {version} of the simulation, and this is version {current}; "
             "choose another --out, or install the release of lerobot_env_excav that began it",
         )
-        values.setdefault("retarget", 0.0)  # recorded before there were changes of mind
+        values.setdefault("retarget", 0.0)  # recorded before there were changes of mind,
+        values.setdefault("retarget_times", 1)  # or several of them
         known = set(declared_settings(cls))
         env = {name.removeprefix("env."): values.pop(name) for name in list(values) if name.startswith("env.")}
         unlike = sorted(values.keys() ^ known)

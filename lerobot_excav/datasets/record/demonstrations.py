@@ -18,7 +18,7 @@ from PIL import UnidentifiedImageError
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.pairs.paired_index import write_index
-from lerobot_excav.datasets.record.change_of_mind import require_approach
+from lerobot_excav.datasets.record.changes_of_mind import require_approach
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
 from lerobot_excav.datasets.record.partial_run import PartialRun

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
-from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
+from lerobot_excav.datasets.record.changes_of_mind import ChangesOfMind
 from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.selection import Schedule
@@ -118,11 +118,11 @@ class EpisodeTape:
 
 
 def demonstrate(
-    env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair, change: ChangeOfMind | None = None
+    env: MaskedTaskEnv[Any, Any], operator: Operator, pair: Pair, changes: ChangesOfMind | None = None
 ) -> Episode:
     """Reset an environment to a pair's start and target, then the operator, and let it play to the end.
 
-    With a change of mind another target is commanded on the way to the first.
+    With changes of mind another target is commanded on the way to the one before.
     Where the task says so, the last frames, in which the operator rests, are played but not returned.
     """
     rests: list[bool] = []
@@ -132,15 +132,11 @@ def demonstrate(
         rests.append(env.task_spec.cuts_rest and bool(operator.done))  # type: ignore[attr-defined]  # see Operator
         return action
 
-    def reset() -> None:
-        operator.reset(env)
-        if change is not None:
-            change.begin(env, operator)
-
     def changed() -> Seen | None:
-        return None if change is None else change.pass_frame(env)
+        return None if changes is None else changes.pass_frame(env, operator)
 
-    episode = _play(env, pair, dict(pair.reset_options), reset=reset, act=act, changed=changed)
+    options = dict(pair.reset_options)
+    episode = _play(env, pair, options, reset=lambda: operator.reset(env), act=act, changed=changed)
     at_work = [frame for frame, is_rest in enumerate(rests) if not is_rest]
     return _without_rest(episode, 1 + max(at_work, default=0))
 

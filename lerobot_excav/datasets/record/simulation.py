@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lerobot_excav.datasets.format.pair import Pair
-from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
+from lerobot_excav.datasets.record.changes_of_mind import ChangesOfMind
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings, PlayedScenes
 from lerobot_excav.datasets.record.episode import Episode, demonstrate, replay
 from lerobot_excav.datasets.record.episode_store import EpisodeStore, Outcome
@@ -75,7 +75,7 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
     env = open_environment(played.env, with_images=with_images)
     seed = played.episode_seed(pair)
     operator = played.task_spec.make_operator(np.random.default_rng(seed))
-    return demonstrate(env, operator, pair, ChangeOfMind.drawn(played.retarget_share, seed))
+    return demonstrate(env, operator, pair, ChangesOfMind.drawn(*played.changes_of_mind, seed))
 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:

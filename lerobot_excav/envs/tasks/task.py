@@ -27,7 +27,7 @@ class Operator(Protocol):
 
     @property
     def approach_s(self) -> float:
-        """How long after `reset` it will be on its way, before it touches what it is to act on [s]."""
+        """How long it is on its way after the newest command, before it touches what it is to act on [s]."""
 
     def reset(self, env: Any) -> None:
         """Look at a freshly reset environment of the task."""

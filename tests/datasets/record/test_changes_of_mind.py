@@ -1,6 +1,7 @@
 """Changes of mind in demonstrations: another target is commanded on the way to the first."""
 
 from contextlib import closing
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from toy_reach.operator import ReachOperator
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.pairs.paired_index import build_index
-from lerobot_excav.datasets.record.change_of_mind import ChangeOfMind
+from lerobot_excav.datasets.record.changes_of_mind import ChangesOfMind
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
 from lerobot_excav.datasets.record.episode import demonstrate
@@ -20,8 +21,8 @@ SMALL = {"observation_height": 40, "observation_width": 56}  # of their own: wor
 TASKS = {"toy_reach": SMALL, "fr5_grasp": SMALL, "excavator": {"fidelity": "fast", **SMALL}}
 
 
-def settings_of(env_type, **changes):
-    return DemonstrationSettings.of(env_type, TASKS[env_type], **{"scenes": 2, "retarget": 1.0, **changes})
+def settings_of(env_type, env=None, **changes):
+    return DemonstrationSettings.of(env_type, env or TASKS[env_type], **{"scenes": 2, "retarget": 1.0, **changes})
 
 
 def commands(episode):
@@ -47,8 +48,9 @@ def test_the_operator_obeys_the_second_command_and_succeeds(env_type):
 @pytest.mark.parametrize(
     ("env_type", "name", "below"), [("fr5_grasp", "fingers_on_target", 2.0), ("excavator", "excavated_mass_kg", 1.0)]
 )
-def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below):
-    settings = settings_of(env_type)
+@pytest.mark.parametrize("times", [1, 3])
+def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below, times):
+    settings = settings_of(env_type, retarget_times=times)
     column = settings.task_spec.task_state_names.index(name)
     for pair in settings.pairs()[1:4]:
         episode = play_demonstration(settings, pair, with_images=False)
@@ -57,15 +59,52 @@ def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below):
 
 
 def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as_they_were():
-    drawn = [ChangeOfMind.drawn(0.3, (7, scene, 0)) is not None for scene in range(1000)]
+    drawn = [ChangesOfMind.drawn(0.3, 1, (7, scene, 0)) is not None for scene in range(1000)]
     assert 0.25 < np.mean(drawn) < 0.35
-    assert ChangeOfMind.drawn(0.0, (7, 0, 0)) is None
+    assert ChangesOfMind.drawn(0.0, 1, (7, 0, 0)) is None
     without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
     same = [
         np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
         for pair in without.pairs()
     ]
     assert 0 < sum(same) < len(same)
+
+
+@pytest.mark.parametrize("env_type", [pytest.param(name, marks=pytest.mark.slow) for name in TASKS])
+def test_several_changes_are_obeyed_each_from_the_way_to_the_target_before(env_type):
+    in_time = {} if env_type == "toy_reach" else {"episode_length": 600}  # three ways take longer than one
+    settings = settings_of(env_type, {**TASKS[env_type], **in_time}, retarget_times=3)
+    counts = set()
+    for pair in settings.pairs()[1::2]:
+        episode = play_demonstration(settings, pair, with_images=False)
+        given = commands(episode)
+        frames, targets = zip(*given, strict=True)
+        counts.add(len(given) - 1)
+        assert all(one != other for one, other in pairwise(targets)), pair
+        assert frames[-1] < episode.length - 1, pair
+        assert episode.success, pair
+    assert counts == {1, 2, 3}
+
+
+def test_the_moment_of_a_single_change_is_drawn_as_before_there_could_be_several():
+    """Demonstrations with a single change stay as they were: `times` draws only if it has a choice."""
+    settings = settings_of("toy_reach")
+    spec = settings.task_spec
+    for pair in settings.pairs()[:3]:
+        seed = settings.episode_seed(pair)
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0x7E3B,)))
+        rng.random()
+        with closing(make_environment(settings.env, with_images=False)) as env:
+            operator = spec.make_operator(np.random.default_rng(seed))
+            env.reset(options=dict(pair.reset_options))
+            operator.reset(env)
+            expected = int(rng.integers(1, max(2, round(operator.approach_s * env.fps))))
+        assert commands(play_demonstration(settings, pair, with_images=False))[1][0] == expected
+
+
+def test_as_many_changes_as_asked_for_need_a_share_of_episodes_that_have_them():
+    with pytest.raises(ConfigurationError, match=r"--retarget_times=3 has no effect with --retarget=0; add"):
+        settings_of("toy_reach", retarget=0.0, retarget_times=3)
 
 
 def test_a_dataset_counts_the_commands_and_passes_its_check_by_replaying_them(tmp_path):
@@ -92,7 +131,7 @@ def test_a_target_that_the_mask_source_does_not_find_leaves_the_command_as_it_wa
 
         monkeypatch.setattr(env, "recommand", refuse)
         operator = settings.task_spec.make_operator(np.random.default_rng(0))
-        episode = demonstrate(env, operator, pair, ChangeOfMind.drawn(1.0, (0,)))
+        episode = demonstrate(env, operator, pair, ChangesOfMind.drawn(1.0, 1, (0,)))
     assert commands(episode) == [(0, pair.target_id)]
     assert episode.success
 
@@ -115,5 +154,5 @@ def test_an_operator_that_does_not_tell_its_way_is_named_before_anything_is_reco
 def test_a_run_that_was_started_before_there_were_changes_of_mind_goes_on(tmp_path):
     settings = settings_of("toy_reach", retarget=0.0)
     record = settings.as_record()
-    assert record.pop("retarget") == 0.0
+    assert (record.pop("retarget"), record.pop("retarget_times")) == (0.0, 1)
     assert DemonstrationSettings.from_record(record, source=tmp_path) == settings

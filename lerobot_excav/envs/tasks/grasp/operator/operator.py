@@ -33,7 +33,7 @@ class GraspOperator:
 
     @property
     def approach_s(self) -> float:
-        """How long after `reset` the fingers begin to close [s]."""
+        """How long after the newest command the fingers begin to close [s]."""
         return self._plan.grip_s
 
     def act(self, env: FR5GraspEnv) -> NDArray[np.float32]:

@@ -46,11 +46,10 @@ class DigOperator:
         self._tremor = Tremor(self._rng, size=self._variation.tremor)
         self._cycle = env.cycle
         self._plan(env)
-        self._approach_s = self._motion.duration_s - self._time_s  # the pause before it counts
 
     @property
     def approach_s(self) -> float:
-        """How long after `reset` the cutting edge is to be where the cut begins [s]."""
+        """How long after the newest command the cutting edge is to be where the cut begins [s]."""
         return self._approach_s
 
     @property
@@ -90,6 +89,7 @@ class DigOperator:
         self._target_id = env.cycle.target_id
         self._dig = plan_dig(env.worksite.soil, env.cycle.target, self._variation)
         self._begin(0, env)
+        self._approach_s = self._motion.duration_s - self._time_s  # the pause before it counts
 
     def _begin(self, phase: int, env: Sight) -> None:
         """Start a phase from where the machine is, after the style's pause; a way that begins in motion has none."""
