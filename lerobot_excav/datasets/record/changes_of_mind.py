@@ -14,7 +14,7 @@ _STREAM = 0x7E3B  # names these random streams, so that the operator draws the s
 
 
 class ChangesOfMind:
-    """Command another target of the start, at a moment drawn from the operator's way to the one before; then again.
+    """Commands another target of the start, at a moment drawn from the operator's way to the one before; then again.
 
     Args:
         rng: Draws moments and targets.
