@@ -227,6 +227,20 @@ def test_what_has_landed_is_not_planned_again(tmp_path):
     }
 
 
+def test_rows_of_the_arm_that_have_landed_need_no_training(tmp_path):
+    """The trainings of the others are planned, and the points of curves that are missing."""
+    metrics = tmp_path / "page" / "metrics"
+    (metrics / "curves" / "paired_channel").mkdir(parents=True)
+    (metrics / "curves" / "paired_channel" / "001000.jsonl").touch()
+    for policy in ("box_token", "no_condition", "nearest_token"):
+        (metrics / f"{policy}.jsonl").touch()
+    (tmp_path / "page" / "audit").mkdir()
+    (tmp_path / "page" / "audit" / "audit.json").touch()
+    plan = dry_run(SNAKEFILE, tmp_path, "out=elsewhere", "results=page")
+    assert {name: counts(plan)[name] for name in ("train", "val", "test")} == {"train": 9, "val": 9, "test": 45}
+    assert not {"audit", "checkpoint"} & set(counts(plan))
+
+
 def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
     """But for their data, their masks and their seed; three kinds of data differ in the number of demonstrations.
 
@@ -280,13 +294,12 @@ def test_test_scenes_are_for_the_table_and_training_scenes_for_training(plan):
 
 
 def test_the_page_shows_what_the_stages_make(plan):
-    contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=Path("elsewhere/test"))
-    made = {Path(path).parent for path in re.findall(r"output: (\S+/metrics\.jsonl)", plan)}
-    rows = {Path("elsewhere/test") / row.label for row in contents.rows}
-    curves = {folder for folder in made if str(folder.parent) in {curve.folder for curve in contents.curve}}
+    metrics = Path("elsewhere/page/metrics")
+    contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=metrics)
+    made = {Path(path) for path in re.findall(rf"output: ({metrics}/\S+\.jsonl)", plan)}
+    rows = {metrics / f"{row.label}.jsonl" for row in contents.rows}
     assert rows <= made
-    assert rows | curves == made
-    assert {curve.folder for curve in contents.curve} == {str(folder.parent) for folder in curves}
+    assert {curve.folder for curve in contents.curve} == {str(path.parent) for path in made - rows}
 
 
 def test_the_page_of_the_excavator_shows_what_the_stages_make(dig_plan):
@@ -326,9 +339,9 @@ def test_the_page_of_the_demo_can_be_read():
 
 def test_the_landed_page_is_made_of_what_lies_beside_it():
     folder = ROOT / "results" / "fr5_grasp"
-    listed = set(ReportFolder(folder).own)
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert listed == {path for path in there if not path.startswith("audit/")} - {LIST}
+    of_others = ("audit/", "metrics/")
+    assert {path for path in there if not path.startswith(of_others)} - {LIST} <= set(ReportFolder(folder).own) <= there
     contents = read_contents(SNAKEFILE.with_name("rows.toml"), metrics=folder / "metrics")
     landed = {path for row in contents.rows for path in contents.metrics_paths(row).values()}
     assert landed == set((folder / "metrics").glob("*.jsonl"))

@@ -15,8 +15,8 @@ Examples:
       two policies, two training seeds each
   lerobot-excav report --rows=workflows/fr5_grasp/rows.toml --out=results/fr5_grasp
       the page of an experiment, from what has been run of it
-  lerobot-excav report --rows=workflows/fr5_grasp/rows.toml --metrics_folder=results/fr5_grasp/metrics
-      the same from the copies that a page keeps
+  lerobot-excav report --rows=workflows/fr5_grasp/rows.toml --metrics_folder=outputs/trial/page/metrics
+      the same of another run of it, printed only
 """
 
 from dataclasses import dataclass
