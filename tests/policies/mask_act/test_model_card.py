@@ -93,6 +93,32 @@ def test_the_card_tells_network_features_and_paths_of_the_mask(tmp_path, config,
     assert missing(model_card(tmp_path, config(**settings), 2_700_000, CardFacts()), *rows) == []
 
 
+HELD = [
+    "up to 20 frames | `hold_mask_frames=20`",
+    "same to the pixel | `replan_iou=1.0`",
+    "from where it is | `backtrack_fr",
+]
+STEADY = ["an empty one is shown | `hold_mask_frames=0`", "by an IoU of 0.2 or more | `replan_iou=0.2`"]
+BACK = ["the way of up to 100 frames, 3 times as fast, and plans from there | `backtrack_frames=100`"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "rows"),
+    [
+        ({}, HELD),
+        ({"hold_mask_frames": 0, "replan_iou": 0.2}, STEADY),
+        ({"backtrack_frames": 100, "backtrack_stride": 3}, BACK),
+        ({"backtrack_frames": 9}, ["the way of up to 9 frames, and plans from there"]),
+    ],
+)
+def test_the_card_tells_what_the_policy_does_while_it_runs(tmp_path, config, settings, rows):
+    assert missing(model_card(tmp_path, config(**settings), 1, CardFacts()), *rows) == []
+
+
+def test_the_card_of_a_policy_that_sees_no_mask_tells_nothing_of_its_absence(tmp_path, config):
+    assert "While it runs" not in str(model_card(tmp_path, config(withhold_mask=True), 1, CardFacts()))
+
+
 def test_facts_make_title_command_and_results(tmp_path, config):
     facts = CardFacts(title="Grasping", env_type="fr5_grasp", results="| row |\n")
     card = model_card(tmp_path, config(), 1, facts)
