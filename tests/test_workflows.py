@@ -3,7 +3,6 @@
 import ast
 import json
 import re
-import runpy
 import shlex
 import subprocess
 import sys
@@ -20,14 +19,10 @@ from lerobot.scripts.lerobot_edit_dataset import EditDatasetConfig
 import lerobot_excav.plugin  # noqa: F401 - registers what the commands name
 from lerobot_excav.datasets.format.schema import COMMAND_KEY, excav_features
 from lerobot_excav.envs.tasks.scoop.spec import SCOOP
-from lerobot_excav.evaluation.metrics import read_evaluation
 from lerobot_excav.evaluation.report_folder import LIST, ReportFolder
 from lerobot_excav.evaluation.result_page.contents import read_contents
 from lerobot_excav.policies.mask_act.configuration_mask_act import MaskACTConfig
 from lerobot_excav.scripts.arguments import parse_arguments
-
-from .evaluation.conftest import SCOOP as SCOOP_LINE
-from .evaluation.conftest import line as metrics_line
 
 ROOT = Path(__file__).parents[1]
 SNAKEFILE = ROOT / "workflows" / "fr5_grasp" / "Snakefile"
@@ -92,8 +87,8 @@ def parse(words):
 
 
 def test_every_stage_is_planned(plan):
-    stages = {"data_shard": 7, "data": 7, "train": 12, "val": 4, "play_shard": 48, "test": 48, "checkpoint": 1}
-    stages |= {"audit": 1, "report": 1, "all": 1}
+    stages = {"data_shard": 7, "data": 7, "train": 13, "best": 1, "val": 4, "point": 4, "play_shard": 49, "test": 49}
+    stages |= {"checkpoint": 1, "audit": 1, "report": 1, "all": 1}
     assert counts(plan) == {**stages, "total": sum(stages.values())}
 
 
@@ -129,7 +124,7 @@ def played(plan, command, first, number):
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 48)), ("dig_plan", (56, 4 * 73))])
+@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 49)), ("dig_plan", (56, 4 * 73))])
 def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
     whole = request.getfixturevalue(name)
@@ -141,77 +136,24 @@ def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     assert all(len(scenes) == len(set(scenes)) for scenes in played(sharded, *ways).values())
 
 
-PARTS = ("0-2", "2-3")
-EPISODES = [metrics_line(SCOOP_LINE, number) for number in range(5)]
-
-
-def write_parts(folder, **of_b):
-    """Write the metrics of two parts, of scenes 0 and 1, and 2 to 4; `of_b` differs in the second's origin."""
-    for name, part in ((PARTS[0], EPISODES[:2]), (PARTS[1], EPISODES[2:])):
-        parts = [{**episode, "evaluation": name, "episode_ix": number} for number, episode in enumerate(part)]
-        (folder / f"{name}.jsonl").write_text("".join(json.dumps(episode) + "\n" for episode in parts))
-        origin = {"command": f"play {name}", "commit": "c", "modified": name == PARTS[1], "seconds": 2.0}
-        origin |= {"policy": "p", "packages": {"mujoco": "3"}, **(of_b if name == PARTS[1] else {})}
-        (folder / f"{name}.json").write_text(json.dumps(origin))
-    return [folder / f"{name}.jsonl" for name in PARTS]
-
-
-def test_parts_of_different_commits_say_so(tmp_path):
-    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    shards["merge_metrics"](write_parts(tmp_path, commit="d"), tmp_path / "whole.jsonl")
-    merged = json.loads((tmp_path / "whole.json").read_text())
-    assert merged["command"] == "play 0-2 && play 2-3  # parts by commits c, d"
-
-
-@pytest.mark.parametrize("differs", [{"policy": "q"}, {"packages": {"mujoco": "4"}}])
-def test_parts_of_another_policy_or_of_other_packages_are_not_put_together(tmp_path, differs):
-    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    with pytest.raises(Exception, match=f"{next(iter(differs))} of .*2-3.jsonl differs"):
-        shards["merge_metrics"](write_parts(tmp_path, **differs), tmp_path / "whole.jsonl")
-    assert {path.stem for path in tmp_path.iterdir()} == set(PARTS)
-
-
-def test_a_part_that_two_runs_have_played_at_once_is_not_put_into_a_row(tmp_path):
-    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    parts = write_parts(tmp_path)
-    twice = [json.loads(text) for text in parts[1].read_text().splitlines() for _ in range(2)]
-    lines = [{**episode, "evaluation": "bc"[number % 2]} for number, episode in enumerate(twice)]
-    parts[1].write_text("".join(json.dumps(line) + "\n" for line in lines))
-    with pytest.raises(Exception, match=r"2-3\.jsonl holds several evaluations"):
-        shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
-    assert not (tmp_path / "whole.jsonl").exists()
-
-
-def test_a_part_that_lacks_an_episode_is_not_put_into_a_row(tmp_path):
-    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    parts = write_parts(tmp_path)
-    parts[1].write_text("".join(parts[1].read_text().splitlines(keepends=True)[:-1]))
-    with pytest.raises(Exception, match=r"2-3\.jsonl holds 2 episodes, not as many as its name says"):
-        shards["merge_metrics"](parts, tmp_path / "whole.jsonl")
-
-
-def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):
-    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
-    episodes = EPISODES
-    shards["merge_metrics"](write_parts(tmp_path), tmp_path / "whole.jsonl")
-    whole = read_evaluation(tmp_path / "whole.jsonl")
-    assert whole.of == 1
-    assert [episode.scene_id for episode in whole.episodes.values()] == list(range(5))
-    texts = (tmp_path / "whole.jsonl").read_text().splitlines()
-    same = [{**json.loads(text), "evaluation": 0, "episode_ix": 0} for text in texts]
-    assert same == [{**episode, "evaluation": 0, "episode_ix": 0} for episode in episodes]
-    merged = json.loads((tmp_path / "whole.json").read_text())
-    known = {"commit": "c", "policy": "p", "packages": {"mujoco": "3"}}
-    assert merged == {"command": "play 0-2 && play 2-3", "modified": True, "seconds": 4.0, **known}
-    shards["remove_parts"]([tmp_path / f"{name}.jsonl" for name in PARTS])
-    assert {path.name for path in tmp_path.iterdir()} == {"whole.jsonl", "whole.json"}
-
-
-@pytest.mark.parametrize(("count", "shards"), [(30, 7), (1, 1), (3, 5), (120, 30)])
-def test_ranges_cover_all_scenes_once_and_are_nearly_equal(count, shards):
-    ranges = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["ranges"](count, shards)
-    assert [scene for first, number in ranges for scene in range(first, first + number)] == list(range(count))
-    assert max(number for _, number in ranges) - min(number for _, number in ranges) <= 1
+@pytest.mark.parametrize("losses", [{1000: 0.31, 2000: 0.29, 3000: 0.3}, {}])
+def test_the_best_checkpoint_is_that_of_the_smallest_loss_on_held_out_episodes(tmp_path, losses):
+    checkpoints = tmp_path / "out" / "train" / "paper_channel" / "checkpoints"
+    for step in (1000, 2000, 3000):
+        (checkpoints / f"{step:06d}").mkdir(parents=True)
+    (tmp_path / "out" / ".fr5_grasp_workflow").touch()
+    log = "".join(f"INFO 2026 train.py:673 step {step}: eval_loss={loss:.4f}\n" for step, loss in losses.items())
+    (tmp_path / "out" / "train" / "paper_channel.log").write_text(log)
+    (tmp_path / "out" / "train" / "paper_channel.done").touch()
+    command = [sys.executable, "-m", "snakemake", "-s", str(SNAKEFILE), "--cores", "1", "--config", "out=out"]
+    command += ["--", "out/train/paper_channel.best"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if losses:
+        assert (checkpoints / "best").resolve().name == "002000", done.stderr
+    else:
+        assert done.returncode != 0
+        assert "tells no loss on held-out episodes" in done.stdout + done.stderr
+        assert not (tmp_path / "out" / "train" / "paper_channel.best").exists()
 
 
 def test_what_has_landed_is_not_planned_again(tmp_path):
@@ -237,7 +179,8 @@ def test_rows_of_the_arm_that_have_landed_need_no_training(tmp_path):
     (tmp_path / "page" / "audit").mkdir()
     (tmp_path / "page" / "audit" / "audit.json").touch()
     plan = dry_run(SNAKEFILE, tmp_path, "out=elsewhere", "results=page")
-    assert {name: counts(plan)[name] for name in ("train", "val", "test")} == {"train": 9, "val": 9, "test": 45}
+    planned = {"train": 10, "val": 9, "point": 9, "test": 46}
+    assert {name: counts(plan)[name] for name in planned} == planned
     assert not {"audit", "checkpoint"} & set(counts(plan))
 
 

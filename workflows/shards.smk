@@ -1,6 +1,7 @@
 """Shards: ranges of scenes that are recorded or played apart, on as many machines as there are."""
 
 import json
+import shutil
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -43,12 +44,30 @@ def lines_of_part(part):
     return lines
 
 
-def merge_metrics(parts, whole):
+def record_with_training(metrics):
+    """Return the record beside a metrics file, with how its policy was trained: its folder does not land, and is gone one day.
+
+    Paths are as seen from here.
+    """
+    from lerobot_excav.evaluation.provenance import EvaluationOrigin  # takes a second, which a dry run need not wait
+
+    text = EvaluationOrigin.read(Path(metrics)).model_dump_json(indent=1) + "\n"
+    return text.replace(f'"{Path.cwd().resolve()}/', '"')
+
+
+def keep_metrics(played, kept):
+    """Copy a metrics file, and its record with how its policy was trained."""
+    Path(kept).with_suffix(".json").write_text(record_with_training(played), encoding="utf-8")
+    shutil.copyfile(played, kept)
+
+
+def merge_metrics(parts, whole, *, keep_training=False):
     """Put metrics files together in their order, and say where the whole comes from.
 
     Episodes are the same as in one run, and numbered so: a reader takes a file whose numbers begin again for several
     evaluations, of which the last one counts. Commands are all of them, seconds their sum; where parts were played by
-    other code, the commands say by which. The whole appears when all of it is written.
+    other code, the commands say by which; `keep_training` writes down how the policy was trained. The whole appears when all
+    of it is written.
 
     Raises:
         WorkflowError: Parts are of other policies, were played with other versions of packages, or one was played twice.
@@ -71,6 +90,8 @@ def merge_metrics(parts, whole):
         "modified": any(origin["modified"] for origin in origins),
     }
     whole.with_suffix(".json").write_text(json.dumps(merged, indent=1) + "\n", encoding="utf-8")
+    if keep_training:
+        whole.with_suffix(".json").write_text(record_with_training(whole), encoding="utf-8")
     text = "".join(json.dumps({**line, **first, "episode_ix": number}) + "\n" for number, line in enumerate(lines))
     unfinished = whole.with_suffix(".tmp")
     unfinished.write_text(text, encoding="utf-8")
