@@ -76,12 +76,32 @@ def test_a_row_that_lands_says_how_its_policy_was_trained(tmp_path, monkeypatch)
         origin = json.loads(part.with_suffix(".json").read_text())
         part.with_suffix(".json").write_text(json.dumps({**origin, "policy": str(policy)}))
     shards["merge_metrics"](parts, tmp_path / "whole.jsonl", keep_training=True)
-    shards["keep_metrics"](parts[0], tmp_path / "copy.jsonl")
     shutil.rmtree(policy)
-    for name in ("whole", "copy"):
-        origin = EvaluationOrigin.read(tmp_path / f"{name}.jsonl")
-        assert origin.policy == "train/box/checkpoints/000005/pretrained_model"
-        assert (origin.training.name, origin.training.demonstrations, origin.training.seed) == ("box", 2, 7)
+    origin = EvaluationOrigin.read(tmp_path / "whole.jsonl")
+    assert origin.policy == "train/box/checkpoints/000005/pretrained_model"
+    assert (origin.training.name, origin.training.demonstrations, origin.training.seed) == ("box", 2, 7)
+
+
+def test_a_row_without_parts_asks_for_another_start(tmp_path):
+    shards = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))
+    with pytest.raises(Exception, match="was being written when a run was stopped"):
+        shards["merge_metrics"]([], tmp_path / "whole.jsonl")
+
+
+@pytest.mark.parametrize(("config", "named"), [({}, ""), ({"data_shards": 3, "out": "o"}, ""), ({"steps": 4}, "steps")])
+def test_rows_of_other_numbers_do_not_come_to_stand_among_those_that_have_landed(config, named):
+    require = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["require_own_results"]
+    require({**config, "results": "elsewhere"})
+    if named:
+        with pytest.raises(Exception, match=f"--config {named} makes rows that are not those of the table"):
+            require(config)
+    else:
+        require(config)
+
+
+@pytest.mark.parametrize(("given", "name"), [(3000, "003000"), ("last", "last"), ("003000", "003000")])
+def test_a_checkpoint_is_called_as_lerobot_writes_it(given, name):
+    assert runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["step_name"](given) == name
 
 
 def test_metrics_of_shards_are_put_together_in_their_order_and_read_as_one_evaluation(tmp_path):

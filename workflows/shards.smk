@@ -1,10 +1,28 @@
 """Shards: ranges of scenes that are recorded or played apart, on as many machines as there are."""
 
 import json
-import shutil
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+
+
+def require_own_results(config):
+    """Check that rows of other settings do not come to stand among those that have landed.
+
+    Raises:
+        WorkflowError: A number of the experiment is given, and no folder for its results.
+    """
+    own = sorted(config.keys() - {"out", "results", "data_shards", "play_shards"})
+    if own and "results" not in config:
+        raise WorkflowError(
+            f"--config {' '.join(own)} makes rows that are not those of the table, which would count as made; give them "
+            "folders of their own, such as out=outputs/trial results=outputs/trial/page"
+        )
+
+
+def step_name(checkpoint):
+    """Return the folder of a checkpoint, which Snakemake reads as a number: LeRobot writes at least six digits."""
+    return f"{checkpoint:06d}" if isinstance(checkpoint, int) else checkpoint
 
 
 def ranges(count, shards):
@@ -55,12 +73,6 @@ def record_with_training(metrics):
     return text.replace(f'"{Path.cwd().resolve()}/', '"')
 
 
-def keep_metrics(played, kept):
-    """Copy a metrics file, and its record with how its policy was trained."""
-    Path(kept).with_suffix(".json").write_text(record_with_training(played), encoding="utf-8")
-    shutil.copyfile(played, kept)
-
-
 def merge_metrics(parts, whole, *, keep_training=False):
     """Put metrics files together in their order, and say where the whole comes from.
 
@@ -70,9 +82,12 @@ def merge_metrics(parts, whole, *, keep_training=False):
     of it is written.
 
     Raises:
-        WorkflowError: Parts are of other policies, were played with other versions of packages, or one was played twice.
+        WorkflowError: There are none, since the row was there when a run was stopped; parts are of other policies, were played
+            with other versions of packages, or one was played twice.
     """
     whole = Path(whole)
+    if not parts:
+        raise WorkflowError(f"{whole} was being written when a run was stopped, and Snakemake removes it; start again")
     lines = [line for part in parts for line in lines_of_part(part)]
     first = {"evaluation": lines[0]["evaluation"]} if "evaluation" in lines[0] else {}
     origins = [json.loads(Path(part).with_suffix(".json").read_text(encoding="utf-8")) for part in parts]

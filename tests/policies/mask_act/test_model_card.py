@@ -99,7 +99,7 @@ HELD = [
     "from where it is | `backtrack_fr",
 ]
 STEADY = ["an empty one is shown | `hold_mask_frames=0`", "by an IoU of 0.2 or more | `replan_iou=0.2`"]
-BACK = ["the way of up to 100 frames, 3 times as fast, and plans from there | `backtrack_frames=100`"]
+BACK = ["if it has come no farther than 100 frames, 3 times as fast, and plans from there | `backtrack_frames=100`"]
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ BACK = ["the way of up to 100 frames, 3 times as fast, and plans from there | `b
         ({}, HELD),
         ({"hold_mask_frames": 0, "replan_iou": 0.2}, STEADY),
         ({"backtrack_frames": 100, "backtrack_stride": 3}, BACK),
-        ({"backtrack_frames": 9}, ["the way of up to 9 frames, and plans from there"]),
+        ({"backtrack_frames": 9}, ["if it has come no farther than 9 frames, and plans from there"]),
     ],
 )
 def test_the_card_tells_what_the_policy_does_while_it_runs(tmp_path, config, settings, rows):
