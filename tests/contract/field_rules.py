@@ -246,6 +246,7 @@ EXCAVATOR = {
     **{"density": one_of("light", "usual", "heavy"), "pile": one_of("heaps", "two_heaps", "ridge")},
     "mask_snap": Rule(lambda v: v is False),  # there is nothing on the ground to snap to
     "keep_out": Rule(lambda v: isinstance(v, str) and v in ZONES, (*ZONES, *NO_ZONES)).beside(task="Clear-v0"),
+    "between_cycles": one_of("obey", "stand").beside(task="Clear-v0"),
     "retarget_frame": optional(whole(1, 199)),  # of 200 frames
 }
 FR5 = {**TASK, "task": one_of("FR5Grasp-v0"), "retarget_frame": optional(whole(1, 399))}  # of 400 frames

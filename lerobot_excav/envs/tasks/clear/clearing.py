@@ -78,10 +78,15 @@ class Clearing:
         self._lost_ticks = self._lost_ticks + 1 if is_lost else 0
 
     @property
+    def is_dumped(self) -> bool:
+        """Whether the running cycle has emptied its bucket into the box; it ends when the soil has come to rest."""
+        # Soil of the cycle before may still fall into the box; that is no dump of this one.
+        return self.cycle.onset_time_s is not None and self.cycle.is_emptied
+
+    @property
     def end(self) -> str | None:
         """How the running cycle has ended, or None if it has not."""
-        # Soil of the cycle before may still fall into the box; that is no dump of this one.
-        if self.cycle.is_complete and self.cycle.onset_time_s is not None:
+        if self.cycle.is_complete and self.is_dumped:
             return DUMPED
         if self._lost_ticks >= SETTLING_TICKS:
             return SPILLED

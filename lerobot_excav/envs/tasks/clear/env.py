@@ -37,7 +37,9 @@ class ClearEnv(ExcavatorEnv):
     proposals: 0 unless options of `reset` say otherwise.
 
     A cycle is over when the bucket has been emptied into the box, when all of a lifted load was lost before the box, or
-    after 25 s. The episode is over after 20 cycles, when nothing is left that is worth a cycle, or at the time limit.
+    after 25 s. With `between_cycles="stand"` the machine stands from when the bucket is empty until the next command,
+    whatever the action says. The episode is over after 20 cycles, when nothing is left that is worth a cycle, or at the
+    time limit.
 
     Scene, observation and action are those of `Scoop-v0`.
 
@@ -91,13 +93,19 @@ class ClearEnv(ExcavatorEnv):
         command, soil = checked_action(action), self.worksite.soil
         box_before_kg = soil.box_mass_kg
         for _ in range(self._ticks_per_frame):
-            self.worksite.tick(command)
+            self.worksite.tick(np.zeros_like(command) if self._stands else command)
             self._clearing.update()
         if not self._is_due and self._clearing.end is not None:
             self._finish_cycle(self._clearing.end)
         gain = (soil.box_mass_kg - box_before_kg) / FULL_BUCKET_KG
         is_over = self._is_due and (len(self._clearing.records) >= CYCLES or self.plan.nothing_left is not None)
         return gain + float(is_over and self.is_success), is_over
+
+    @property
+    def _stands(self) -> bool:
+        """Whether the machine stands, whatever it is told: its bucket is empty and the next command has not come."""
+        may_stand = self._excavator_settings.between_cycles == "stand"
+        return may_stand and (self._is_due or self._clearing.is_dumped)
 
     def _finish_cycle(self, end: str) -> None:
         self._clearing.finish(end)
@@ -212,6 +220,7 @@ class ClearEnv(ExcavatorEnv):
         records = clearing.all_records()
         return {
             "soil": settings.soil_name,
+            "between_cycles": settings.between_cycles,
             "pile_removed": clearing.pile_removed,
             "retained_mass_kg": sum(record.retained_mass_kg for record in records),
             "hard_target_contacts": clearing.hard_target_contacts,

@@ -11,6 +11,7 @@ from lerobot_excav.envs.tasks.clear.cycle_record import DUMPED, ENDS, FAILURES, 
 from lerobot_excav.envs.tasks.clear.event_list import EVENTS
 from lerobot_excav.envs.tasks.measures import Column, Kind, TargetId, TaskMeasures, one_of
 from lerobot_excav.envs.tasks.scoop.measures import DigRecord
+from lerobot_excav.envs.tasks.scoop.settings import BETWEEN_CYCLES
 from lerobot_excav.envs.tasks.scoop.spec import TASK_STATE_NAMES
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class ClearRecord(DigRecord):
     """Outcome of one pile."""
 
     keep_out: str  # zones in which nothing may be dug
+    between_cycles: Annotated[str, one_of(BETWEEN_CYCLES)] = "obey"  # files of earlier releases do not say it
     pile_removed: float = Field(le=1.0)  # part of the pile that is gone from the dig area
     retained_mass_kg: float  # soil brought into the box, in all cycles [kg]
     hard_target_contacts: NonNegativeInt  # hard contacts with the box
@@ -72,7 +74,7 @@ class ClearRecord(DigRecord):
     @override
     def mask(self) -> str:
         """What the mask showed, in words; that it changes with every cycle goes without saying."""
-        return self.mask_words
+        return self.mask_words if self.between_cycles == "obey" else f"{self.mask_words}, standing when it changes"
 
     @property
     def cycle_count(self) -> int:
@@ -191,6 +193,7 @@ CLEAR_MEASURES = TaskMeasures(
         "pile": "shapes of piles",
         "fidelity": "fidelities",
         "keep_out": "keep-out zones",
+        "between_cycles": "ways to wait for a command",
     },
     shared={},
     setting={"soil": "soil_words", "mask": "mask"},

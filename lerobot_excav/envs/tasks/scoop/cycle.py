@@ -84,8 +84,7 @@ class DigCycle:
             self.onset_w = np.array(self._worksite.machine.cutting_edge_pos_w)
             self.target_hit = bool(self.target.contains(self.onset_w))
             self.onset_time_s = self._ticks * TICK_S
-        dumped = state.deposited_mass_kg >= LOADING_ONSET_KG and state.bucket_mass_kg < LOADING_ONSET_KG
-        settled = dumped and not self._soil_moves_over_box()
+        settled = self.is_emptied and not self._soil_moves_over_box()
         self._empty_ticks = self._empty_ticks + 1 if settled else 0
 
     def _soil_moves_over_box(self) -> bool:
@@ -93,6 +92,12 @@ class DigCycle:
         soil = self._worksite.soil
         loose_w = soil.parcel_positions_w[~soil.parcel_is_load]
         return bool((distance_to_box_footprint_m(loose_w) == 0.0).any())
+
+    @property
+    def is_emptied(self) -> bool:
+        """Whether soil has been brought to the box and the bucket is empty; how much there is may still change."""
+        state = self._meter.state
+        return state.deposited_mass_kg >= LOADING_ONSET_KG and state.bucket_mass_kg < LOADING_ONSET_KG
 
     @property
     def is_complete(self) -> bool:

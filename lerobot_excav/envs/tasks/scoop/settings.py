@@ -16,6 +16,8 @@ from lerobot_excav.setting import setting, with_default
 DENSITIES = {"light": 0.8, "usual": 1.0, "heavy": 1.2}
 """Factor on the density of the soil (kind: design), which moist or packed sand differs by."""
 
+BETWEEN_CYCLES = ("obey", "stand")
+
 CYCLE_DURATION_S = 20.0
 """Time limit of a single cycle unless another is asked for [s] (kind: paper)."""
 
@@ -62,6 +64,14 @@ class ExcavatorSettings(RetargetSettings):
         changes_start=True,
     )
 
+    between_cycles: str = setting(
+        "What the machine does in Clear-v0 from a dump until the next command: obey its sticks, or stand, whatever "
+        "they say, as it does where demonstrations of Scoop-v0 end",
+        default="obey",
+        choices=BETWEEN_CYCLES,
+        is_column=True,
+    )
+
     def __post_init__(self) -> None:
         super().__post_init__()
         require(
@@ -75,7 +85,11 @@ class ExcavatorSettings(RetargetSettings):
             f"{self.PREFIX}keep_out={self.keep_out!r} has no effect with {self.PREFIX}task='Scoop-v0', whose regions "
             "belong to the scene; leave it out, or give --env.task=Clear-v0",
         )
-
+        require(
+            self.between_cycles == "obey" or self.task != "Scoop-v0",
+            f"{self.PREFIX}between_cycles={self.between_cycles!r} has no effect with {self.PREFIX}task='Scoop-v0', a "
+            "single cycle; leave it out, or give --env.task=Clear-v0",
+        )
         require(
             self.retarget_frame is None or self.task == "Scoop-v0",
             f"{self.PREFIX}retarget_frame={self.retarget_frame} has no effect with {self.PREFIX}task={self.task!r}, "

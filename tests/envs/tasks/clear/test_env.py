@@ -279,6 +279,44 @@ def test_an_environment_that_does_not_play_a_task_says_which_does():
         ExcavatorEnv(task="Clear-v0", **CHEAP)
 
 
+def swing_after_a_dump(between_cycles):
+    """Let the operator dump, then push the swing stick; return way [rad] and speed [rad/s] at the next command."""
+    env = ClearEnv(**CHEAP, scene_set="val", between_cycles=between_cycles)
+    env.reset(options={"scene_id": 0})
+    operator = DigOperator(rng=np.random.default_rng(0))
+    operator.reset(env)
+    while not env.clearing.is_dumped:
+        env.step(operator.act(env))
+    begin, first = env.worksite.machine.joint_pos[0], env.command.since_frame
+    frames = 0
+    while env.command.since_frame == first:
+        env.step(np.array([1.0, 0.0, 0.0, 0.0], np.float32))
+        frames += 1
+    way_rad, speed_rad_s = env.worksite.machine.joint_pos[0] - begin, env.worksite.machine.joint_vel[0]
+    env.step(np.array([1.0, 0.0, 0.0, 0.0], np.float32))
+    obeys_again = env.worksite.machine.joint_vel[0] > speed_rad_s + 0.01
+    assert env.clearing.records[0].end == "dump"
+    env.close()
+    return frames, abs(way_rad), abs(speed_rad_s), obeys_again
+
+
+def test_a_machine_that_stands_between_cycles_moves_again_with_the_next_command():
+    frames, way_rad, speed_rad_s, _ = swing_after_a_dump("obey")
+    assert frames >= 5
+    assert way_rad > 0.1
+    assert speed_rad_s > 0.3
+    frames, way_rad, speed_rad_s, obeys_again = swing_after_a_dump("stand")
+    assert frames >= 5
+    assert way_rad < 0.02
+    assert speed_rad_s < 0.01
+    assert obeys_again
+
+
+def test_between_cycles_means_nothing_to_a_single_scoop():
+    with pytest.raises(ConfigurationError, match=r"between_cycles='stand' has no effect with task='Scoop-v0'"):
+        ExcavatorEnv(between_cycles="stand", **CHEAP)
+
+
 def test_zones_mean_nothing_to_a_single_scoop():
     with pytest.raises(ConfigurationError, match=r"keep_out='-3,-3,3,3' has no effect with task='Scoop-v0'"):
         ExcavatorEnv(keep_out=ALL_OVER, **CHEAP)
