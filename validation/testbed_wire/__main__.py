@@ -26,7 +26,7 @@ from validation.testbed_wire.rollout import Wire, cycles_behind, late_ticks
 from validation.whole_numbers import whole_numbers
 
 FILE = Path("results", "scoop", "testbed_wire.jsonl")
-CHECKPOINT = Path("checkpoints", "excavator_mask_act")
+CHECKPOINT = Path("results", "excavator", "checkpoints", "paired_token-1000")  # that all conditions were driven by
 DELAYS_MS, LOSSES_PERCENT = (0, 25, 50, 100), (5, 20, 50)
 SCENE_SET = "val"
 KEPT = ("scene_id", "target_id", "simulation_version", "is_success", "target_success", "retained_mass_kg")

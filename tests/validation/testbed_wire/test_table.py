@@ -10,7 +10,7 @@ from validation.testbed_wire.rollout import Wire
 def cycle(wire, scene_id, target_id, *, is_success):
     return {
         **wire._asdict(),
-        "policy": "excavator_mask_act",
+        "policy": study.CHECKPOINT.name,
         **{"scene_id": scene_id, "target_id": target_id, "simulation_version": SCOOP.simulation_version},
         **{"is_success": is_success, "target_success": True, "retained_mass_kg": 400.0},
     }
