@@ -331,6 +331,7 @@ DEMOS = {
     **{**SCENES, "storage": optional(one_of("image", "video")), "keep_failures": flag},
     "retarget": number(0.0, 1.0),
     "retarget_times": whole(1, 20).beside(retarget=0.5),
+    "retarget_late": number(0.0, 1.0).beside(retarget=0.5),
     "stages": Rule(is_stage_list, GOOD_STAGES + BAD_STAGES, is_text=True),
 }
 WORK = {"workers": whole(0, 1024)}

@@ -10,6 +10,12 @@ from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.task import Operator, TaskSpec
 from lerobot_excav.errors import require
 
+LATE_S = 0.5
+"""How long before the operator would touch its target a late change comes at most [s] (kind: guess).
+
+The excavator's operator still turns away then, where a policy that has seen few late changes digs on.
+"""
+
 _STREAM = 0x7E3B  # names these random streams, so that the operator draws the same with and without changes of mind
 
 
@@ -19,26 +25,29 @@ class ChangesOfMind:
     Args:
         rng: Draws moments and targets.
         count: How many changes there are.
+        late: Share of them that come in the last `LATE_S` of the way.
     """
 
-    def __init__(self, rng: np.random.Generator, count: int = 1) -> None:
+    def __init__(self, rng: np.random.Generator, count: int = 1, late: float = 0.0) -> None:
         self._rng = rng
+        self._late = late
         self._left = count
         self._frame: int | None = None  # of the next change; None: not drawn, the operator has yet to find its way
 
     @classmethod
-    def drawn(cls, share: float, times: int, seed: tuple[int, ...]) -> Self | None:
+    def drawn(cls, share: float, times: int, late: float, seed: tuple[int, ...]) -> Self | None:
         """Return the changes of mind of an episode, or None: it has some with probability `share`.
 
         Args:
             share: 0 to 1.
             times: How many there are at most; the number is drawn, all from 1 on alike.
+            late: Share of the changes that come late, 0 to 1; the others are drawn from the whole way.
             seed: Entropy of the episode.
         """
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
         if rng.random() >= share:
             return None
-        return cls(rng, 1 if times == 1 else int(rng.integers(1, times, endpoint=True)))
+        return cls(rng, 1 if times == 1 else int(rng.integers(1, times, endpoint=True)), late)
 
     def pass_frame(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> Seen | None:
         """Give the next command if it is time; return what is seen under it.
@@ -61,7 +70,10 @@ class ChangesOfMind:
     def _frames_on_the_way(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> int:
         """Draw how long the newest command holds: for an action at least, until the operator touches at most."""
         passed = env.frame - env.command.since_frame  # the operator finds its way with its first action
-        return int(self._rng.integers(1, max(2, round(operator.approach_s * env.fps)))) - passed
+        touch = max(2, round(operator.approach_s * env.fps))
+        is_late = self._late > 0.0 and self._rng.random() < self._late  # without, draws stay as they were
+        first = max(1, touch - round(LATE_S * env.fps)) if is_late else 1
+        return int(self._rng.integers(first, touch)) - passed
 
     def _changed(self, env: MaskedTaskEnv[Any, Any]) -> Seen | None:
         """Command a target other than the present one."""

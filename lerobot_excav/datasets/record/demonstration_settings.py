@@ -106,9 +106,9 @@ class PlayedScenes:
         return draw_stages(self.listed_stages, self.seed, SCENE_SETS.index(self.env.scene_set), scene_id)
 
     @property
-    def changes_of_mind(self) -> tuple[float, int]:
-        """Share of the episodes with changes of mind, and how many those have at most."""
-        return 0.0, 1
+    def changes_of_mind(self) -> tuple[float, int, float]:
+        """Share of the episodes with changes of mind, how many those have at most, and the share of late ones."""
+        return 0.0, 1, 0.0
 
     @property
     def episode_count(self) -> int:
@@ -170,6 +170,13 @@ class DemonstrationSettings(PlayedScenes):
         low=1,
         high=MOST_CHANGES,
     )
+    retarget_late: float = setting(
+        "Share of these changes that come in the last 0.5 s before the operator would touch its target; the others are "
+        "drawn from its whole way",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+    )
     keep_failures: bool = setting("Whether episodes without success stay in the dataset, marked as such", default=False)
     stages: str = setting(
         "Stages at which every scene is shown, such as 0,4,8: after so many cycles that a seeded operator has dug "
@@ -192,6 +199,11 @@ class DemonstrationSettings(PlayedScenes):
             f"--retarget_times={self.retarget_times} has no effect with --retarget=0; add the share of the episodes "
             "that change their mind, such as --retarget=0.7",
         )
+        require(
+            self.retarget_late == 0.0 or self.retarget > 0.0,
+            f"--retarget_late={self.retarget_late} has no effect with --retarget=0; add the share of the episodes that "
+            "change their mind, such as --retarget=0.7",
+        )
         self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
 
     @property
@@ -200,9 +212,9 @@ class DemonstrationSettings(PlayedScenes):
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
 
     @property
-    def changes_of_mind(self) -> tuple[float, int]:
-        """Share of the episodes with changes of mind, and how many those have at most."""
-        return self.retarget, self.retarget_times
+    def changes_of_mind(self) -> tuple[float, int, float]:
+        """Share of the episodes with changes of mind, how many those have at most, and the share of late ones."""
+        return self.retarget, self.retarget_times, self.retarget_late
 
     def possible_pairs(self) -> list[Pair]:
         """Return the episodes that may be played, whichever targets the rule chooses."""
@@ -251,7 +263,8 @@ class DemonstrationSettings(PlayedScenes):
             "choose another --out, or install the release of lerobot_env_excav that began it",
         )
         values.setdefault("retarget", 0.0)  # recorded before there were changes of mind,
-        values.setdefault("retarget_times", 1)  # or several of them
+        values.setdefault("retarget_times", 1)  # or several of them,
+        values.setdefault("retarget_late", 0.0)  # or late ones
         known = set(declared_settings(cls))
         env = {name.removeprefix("env."): values.pop(name) for name in list(values) if name.startswith("env.")}
         unlike = sorted(values.keys() ^ known)

@@ -59,9 +59,9 @@ def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below, 
 
 
 def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as_they_were():
-    drawn = [ChangesOfMind.drawn(0.3, 1, (7, scene, 0)) is not None for scene in range(1000)]
+    drawn = [ChangesOfMind.drawn(0.3, 1, 0.0, (7, scene, 0)) is not None for scene in range(1000)]
     assert 0.25 < np.mean(drawn) < 0.35
-    assert ChangesOfMind.drawn(0.0, 1, (7, 0, 0)) is None
+    assert ChangesOfMind.drawn(0.0, 1, 0.0, (7, 0, 0)) is None
     without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
     same = [
         np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
@@ -107,6 +107,38 @@ def test_as_many_changes_as_asked_for_need_a_share_of_episodes_that_have_them():
         settings_of("toy_reach", retarget=0.0, retarget_times=3)
 
 
+@pytest.mark.parametrize("env_type", [pytest.param(name, marks=pytest.mark.slow) for name in TASKS])
+def test_late_changes_come_in_the_last_half_second_and_are_obeyed(env_type):
+    settings = settings_of(env_type, retarget_late=1.0)
+    spec = settings.task_spec
+    for pair in settings.pairs()[::3]:
+        with closing(make_environment(settings.env, with_images=False)) as env:
+            operator = spec.make_operator(np.random.default_rng(settings.episode_seed(pair)))
+            env.reset(options=dict(pair.reset_options))
+            operator.reset(env)
+            touch = operator.approach_s * env.fps
+        episode = play_demonstration(settings, pair, with_images=False)
+        changed = commands(episode)[1][0]
+        assert touch - 0.5 * settings.env.fps - 1 <= changed < touch
+        assert episode.success, pair
+
+
+def test_the_share_of_late_changes_says_how_many_there_are():
+    settings = settings_of("toy_reach", scenes=30, retarget_late=0.5)
+    always = settings_of("toy_reach", scenes=30, retarget_late=1.0)
+    never = settings_of("toy_reach", scenes=30)
+    first = [
+        np.mean([commands(play_demonstration(s, pair, with_images=False))[1][0] for pair in s.pairs()])
+        for s in (never, settings, always)
+    ]
+    assert first[0] < first[1] < first[2]
+
+
+def test_late_changes_need_a_share_of_episodes_that_have_them():
+    with pytest.raises(ConfigurationError, match=r"--retarget_late=0\.5 has no effect with --retarget=0; add"):
+        settings_of("toy_reach", retarget=0.0, retarget_late=0.5)
+
+
 def test_a_dataset_counts_the_commands_and_passes_its_check_by_replaying_them(tmp_path):
     out = tmp_path / "dataset"
     settings = settings_of("toy_reach", retarget=0.5)
@@ -131,7 +163,7 @@ def test_a_target_that_the_mask_source_does_not_find_leaves_the_command_as_it_wa
 
         monkeypatch.setattr(env, "recommand", refuse)
         operator = settings.task_spec.make_operator(np.random.default_rng(0))
-        episode = demonstrate(env, operator, pair, ChangesOfMind.drawn(1.0, 1, (0,)))
+        episode = demonstrate(env, operator, pair, ChangesOfMind.drawn(1.0, 1, 0.0, (0,)))
     assert commands(episode) == [(0, pair.target_id)]
     assert episode.success
 
@@ -154,5 +186,5 @@ def test_an_operator_that_does_not_tell_its_way_is_named_before_anything_is_reco
 def test_a_run_that_was_started_before_there_were_changes_of_mind_goes_on(tmp_path):
     settings = settings_of("toy_reach", retarget=0.0)
     record = settings.as_record()
-    assert (record.pop("retarget"), record.pop("retarget_times")) == (0.0, 1)
+    assert [record.pop(name) for name in ("retarget", "retarget_times", "retarget_late")] == [0.0, 1, 0.0]
     assert DemonstrationSettings.from_record(record, source=tmp_path) == settings
