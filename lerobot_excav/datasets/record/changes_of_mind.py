@@ -4,17 +4,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from lerobot_excav.datasets.record.change_odds import LATE_S, ChangeOdds
 from lerobot_excav.envs.masks.source import MaskMissingError
 from lerobot_excav.envs.tasks.commanded import Seen
 from lerobot_excav.envs.tasks.masked_env import MaskedTaskEnv
 from lerobot_excav.envs.tasks.task import Operator, TaskSpec
 from lerobot_excav.errors import require
-
-LATE_S = 0.5
-"""How long before the operator would touch its target a late change comes at most [s] (kind: guess).
-
-The excavator's operator still turns away then, where a policy that has seen few late changes digs on.
-"""
 
 _STREAM = 0x7E3B  # names these random streams, so that the operator draws the same with and without changes of mind
 
@@ -35,19 +30,17 @@ class ChangesOfMind:
         self._frame: int | None = None  # of the next change; None: not drawn, the operator has yet to find its way
 
     @classmethod
-    def drawn(cls, share: float, times: int, late: float, seed: tuple[int, ...]) -> Self | None:
-        """Return the changes of mind of an episode, or None: it has some with probability `share`.
+    def drawn(cls, odds: ChangeOdds, seed: tuple[int, ...]) -> Self | None:
+        """Return the changes of mind of an episode, or None: it has some with probability `odds.share`.
 
         Args:
-            share: 0 to 1.
-            times: How many there are at most; the number is drawn, all from 1 on alike.
-            late: Share of the changes that come late, 0 to 1; the others are drawn from the whole way.
+            odds: What they are drawn from.
             seed: Entropy of the episode.
         """
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
-        if rng.random() >= share:
+        if rng.random() >= odds.share:
             return None
-        return cls(rng, 1 if times == 1 else int(rng.integers(1, times, endpoint=True)), late)
+        return cls(rng, 1 if odds.times == 1 else int(rng.integers(1, odds.times, endpoint=True)), odds.late)
 
     def pass_frame(self, env: MaskedTaskEnv[Any, Any], operator: Operator) -> Seen | None:
         """Give the next command if it is time; return what is seen under it.

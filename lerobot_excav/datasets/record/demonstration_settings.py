@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from lerobot_excav.datasets.format.pair import Pair
 from lerobot_excav.datasets.format.storage import STORAGES
+from lerobot_excav.datasets.record.change_odds import LATE_S, ChangeOdds
 from lerobot_excav.datasets.record.stage_list import draw_stages, parse_stages, stage_list
 from lerobot_excav.datasets.record.target_rule import TARGET_RULES, targets_of_start
 from lerobot_excav.envs.tasks.registry import env_types, task_of_settings
@@ -106,9 +107,9 @@ class PlayedScenes:
         return draw_stages(self.listed_stages, self.seed, SCENE_SETS.index(self.env.scene_set), scene_id)
 
     @property
-    def changes_of_mind(self) -> tuple[float, int, float]:
-        """Share of the episodes with changes of mind, how many those have at most, and the share of late ones."""
-        return 0.0, 1, 0.0
+    def change_odds(self) -> ChangeOdds:
+        """What the changes of mind of an episode are drawn from."""
+        return ChangeOdds()
 
     @property
     def episode_count(self) -> int:
@@ -171,8 +172,8 @@ class DemonstrationSettings(PlayedScenes):
         high=MOST_CHANGES,
     )
     retarget_late: float = setting(
-        "Share of these changes that come in the last 0.5 s before the operator would touch its target; the others are "
-        "drawn from its whole way",
+        f"Share of these changes that come in the last {LATE_S} s before the operator would touch its target; the "
+        "others are drawn from its whole way",
         default=0.0,
         low=0.0,
         high=1.0,
@@ -194,16 +195,13 @@ class DemonstrationSettings(PlayedScenes):
             f"--retarget={self.retarget} has no meaning for {self.task_spec.id} with these settings: the task itself "
             "says when the command changes; leave it out",
         )
-        require(
-            self.retarget_times == 1 or self.retarget > 0.0,
-            f"--retarget_times={self.retarget_times} has no effect with --retarget=0; add the share of the episodes "
-            "that change their mind, such as --retarget=0.7",
-        )
-        require(
-            self.retarget_late == 0.0 or self.retarget > 0.0,
-            f"--retarget_late={self.retarget_late} has no effect with --retarget=0; add the share of the episodes that "
-            "change their mind, such as --retarget=0.7",
-        )
+        for name, without in (("retarget_times", 1), ("retarget_late", 0.0)):
+            value = getattr(self, name)
+            require(
+                value == without or self.retarget > 0.0,
+                f"--{name}={value} has no effect with --retarget=0; add the share of the episodes that change their "
+                "mind, such as --retarget=0.7",
+            )
         self.stages = stage_list(parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec))
 
     @property
@@ -212,9 +210,9 @@ class DemonstrationSettings(PlayedScenes):
         return parse_stages(f"{self.PREFIX}stages", self.stages, self.task_spec)
 
     @property
-    def changes_of_mind(self) -> tuple[float, int, float]:
-        """Share of the episodes with changes of mind, how many those have at most, and the share of late ones."""
-        return self.retarget, self.retarget_times, self.retarget_late
+    def change_odds(self) -> ChangeOdds:
+        """What the changes of mind of an episode are drawn from."""
+        return ChangeOdds(self.retarget, self.retarget_times, self.retarget_late)
 
     def possible_pairs(self) -> list[Pair]:
         """Return the episodes that may be played, whichever targets the rule chooses."""

@@ -75,7 +75,7 @@ def play_demonstration(played: PlayedScenes, pair: Pair, *, with_images: bool = 
     env = open_environment(played.env, with_images=with_images)
     seed = played.episode_seed(pair)
     operator = played.task_spec.make_operator(np.random.default_rng(seed))
-    return demonstrate(env, operator, pair, ChangesOfMind.drawn(*played.changes_of_mind, seed))
+    return demonstrate(env, operator, pair, ChangesOfMind.drawn(played.change_odds, seed))
 
 
 def make_environment(settings: TaskSettings, *, with_images: bool) -> MaskedTaskEnv[Any, Any]:

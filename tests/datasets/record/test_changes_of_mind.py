@@ -9,6 +9,7 @@ from toy_reach.operator import ReachOperator
 
 from lerobot_excav.datasets.check.quality_check import check_dataset
 from lerobot_excav.datasets.pairs.paired_index import build_index
+from lerobot_excav.datasets.record.change_odds import ChangeOdds
 from lerobot_excav.datasets.record.changes_of_mind import ChangesOfMind
 from lerobot_excav.datasets.record.demonstration_settings import DemonstrationSettings
 from lerobot_excav.datasets.record.demonstrations import record_demonstrations
@@ -27,6 +28,15 @@ def settings_of(env_type, env=None, **changes):
 
 def commands(episode):
     return sorted({(int(f), int(t)) for f, t in zip(episode.command_frame, episode.target_id, strict=True)})
+
+
+def frames_of_the_way(settings, pair):
+    """How long the operator is on its way to the first target, as a number of frames with a fraction."""
+    with closing(make_environment(settings.env, with_images=False)) as env:
+        operator = settings.task_spec.make_operator(np.random.default_rng(settings.episode_seed(pair)))
+        env.reset(options=dict(pair.reset_options))
+        operator.reset(env)
+        return operator.approach_s * env.fps
 
 
 @pytest.mark.parametrize("env_type", [pytest.param(name, marks=pytest.mark.slow) for name in TASKS])
@@ -59,9 +69,9 @@ def test_nothing_is_held_or_dug_when_the_command_changes(env_type, name, below, 
 
 
 def test_the_share_says_how_many_episodes_have_one_and_none_leaves_the_others_as_they_were():
-    drawn = [ChangesOfMind.drawn(0.3, 1, 0.0, (7, scene, 0)) is not None for scene in range(1000)]
+    drawn = [ChangesOfMind.drawn(ChangeOdds(0.3), (7, scene, 0)) is not None for scene in range(1000)]
     assert 0.25 < np.mean(drawn) < 0.35
-    assert ChangesOfMind.drawn(0.0, 1, 0.0, (7, 0, 0)) is None
+    assert ChangesOfMind.drawn(ChangeOdds(0.0), (7, 0, 0)) is None
     without, with_some = (settings_of("toy_reach", retarget=share) for share in (0.0, 0.5))
     same = [
         np.array_equal(*(play_demonstration(s, pair, with_images=False).action for s in (without, with_some)))
@@ -89,16 +99,10 @@ def test_several_changes_are_obeyed_each_from_the_way_to_the_target_before(env_t
 def test_the_moment_of_a_single_change_is_drawn_as_before_there_could_be_several():
     """Demonstrations with a single change stay as they were: `times` draws only if it has a choice."""
     settings = settings_of("toy_reach")
-    spec = settings.task_spec
     for pair in settings.pairs()[:3]:
-        seed = settings.episode_seed(pair)
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0x7E3B,)))
+        rng = np.random.default_rng(np.random.SeedSequence(settings.episode_seed(pair), spawn_key=(0x7E3B,)))
         rng.random()
-        with closing(make_environment(settings.env, with_images=False)) as env:
-            operator = spec.make_operator(np.random.default_rng(seed))
-            env.reset(options=dict(pair.reset_options))
-            operator.reset(env)
-            expected = int(rng.integers(1, max(2, round(operator.approach_s * env.fps))))
+        expected = int(rng.integers(1, max(2, round(frames_of_the_way(settings, pair)))))
         assert commands(play_demonstration(settings, pair, with_images=False))[1][0] == expected
 
 
@@ -110,13 +114,8 @@ def test_as_many_changes_as_asked_for_need_a_share_of_episodes_that_have_them():
 @pytest.mark.parametrize("env_type", [pytest.param(name, marks=pytest.mark.slow) for name in TASKS])
 def test_late_changes_come_in_the_last_half_second_and_are_obeyed(env_type):
     settings = settings_of(env_type, retarget_late=1.0)
-    spec = settings.task_spec
     for pair in settings.pairs()[::3]:
-        with closing(make_environment(settings.env, with_images=False)) as env:
-            operator = spec.make_operator(np.random.default_rng(settings.episode_seed(pair)))
-            env.reset(options=dict(pair.reset_options))
-            operator.reset(env)
-            touch = operator.approach_s * env.fps
+        touch = frames_of_the_way(settings, pair)
         episode = play_demonstration(settings, pair, with_images=False)
         changed = commands(episode)[1][0]
         assert touch - 0.5 * settings.env.fps - 1 <= changed < touch
@@ -163,7 +162,7 @@ def test_a_target_that_the_mask_source_does_not_find_leaves_the_command_as_it_wa
 
         monkeypatch.setattr(env, "recommand", refuse)
         operator = settings.task_spec.make_operator(np.random.default_rng(0))
-        episode = demonstrate(env, operator, pair, ChangesOfMind.drawn(1.0, 1, 0.0, (0,)))
+        episode = demonstrate(env, operator, pair, ChangesOfMind.drawn(ChangeOdds(1.0), (0,)))
     assert commands(episode) == [(0, pair.target_id)]
     assert episode.success
 
