@@ -88,17 +88,6 @@ def test_a_row_without_parts_asks_for_another_start(tmp_path):
         shards["merge_metrics"]([], tmp_path / "whole.jsonl")
 
 
-@pytest.mark.parametrize(("config", "named"), [({}, ""), ({"data_shards": 3, "out": "o"}, ""), ({"steps": 4}, "steps")])
-def test_rows_of_other_numbers_do_not_come_to_stand_among_those_that_have_landed(config, named):
-    require = runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["require_own_results"]
-    require({**config, "results": "elsewhere"})
-    if named:
-        with pytest.raises(Exception, match=f"--config {named} makes rows that are not those of the table"):
-            require(config)
-    else:
-        require(config)
-
-
 @pytest.mark.parametrize(("given", "name"), [(3000, "003000"), ("last", "last"), ("003000", "003000")])
 def test_a_checkpoint_is_called_as_lerobot_writes_it(given, name):
     assert runpy.run_path(str(ROOT / "workflows" / "shards.smk"))["step_name"](given) == name

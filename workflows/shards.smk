@@ -6,20 +6,6 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 
-def require_own_results(config):
-    """Check that rows of other settings do not come to stand among those that have landed.
-
-    Raises:
-        WorkflowError: A number of the experiment is given, and no folder for its results.
-    """
-    own = sorted(config.keys() - {"out", "results", "data_shards", "play_shards"})
-    if own and "results" not in config:
-        raise WorkflowError(
-            f"--config {' '.join(own)} makes rows that are not those of the table, which would count as made; give them "
-            "folders of their own, such as out=outputs/trial results=outputs/trial/page"
-        )
-
-
 def step_name(checkpoint):
     """Return the folder of a checkpoint, which Snakemake reads as a number: LeRobot writes at least six digits."""
     return f"{checkpoint:06d}" if isinstance(checkpoint, int) else checkpoint
