@@ -93,8 +93,8 @@ def test_every_stage_is_planned(plan):
 
 
 def test_every_stage_of_the_excavator_is_planned(dig_plan):
-    stages = {"data_shard": 8, "data": 8, "slim": 8, "train": 24, "checkpoint": 24, "operator": 9}
-    stages |= {"play_shard": 510, "play": 85, "audit": 2, "report": 1, "all": 1}
+    stages = {"data_shard": 9, "data": 9, "slim": 9, "train": 25, "checkpoint": 25, "operator": 9}
+    stages |= {"play_shard": 534, "play": 89, "audit": 2, "report": 1, "all": 1}
     assert counts(dig_plan) == {**stages, "total": sum(stages.values())}
 
 
@@ -124,7 +124,7 @@ def played(plan, command, first, number):
     return {kind: sorted(numbers) for kind, numbers in scenes.items()}
 
 
-@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 49)), ("dig_plan", (56, 4 * 85))])
+@pytest.mark.parametrize(("name", "shards"), [("plan", (49, 4 * 49)), ("dig_plan", (63, 4 * 89))])
 def test_shards_play_the_scenes_of_one_piece(name, shards, request, tmp_path):
     snakefile, page = {"plan": (SNAKEFILE, "elsewhere/page"), "dig_plan": (EXCAVATOR, "page")}[name]
     whole = request.getfixturevalue(name)
@@ -165,7 +165,7 @@ def test_what_has_landed_is_not_planned_again(tmp_path):
             (tmp_path / "page" / "metrics" / f"{task}_{policy}-{seed}.jsonl").touch()
     plan = dry_run(EXCAVATOR, tmp_path, "out=elsewhere", "results=page")
     assert {name: counts(plan)[name] for name in ("train", "checkpoint", "play")} == {
-        **{"train": 22, "checkpoint": 22, "play": 82},
+        **{"train": 23, "checkpoint": 23, "play": 86},
     }
 
 
@@ -193,21 +193,22 @@ def test_all_methods_of_the_excavator_are_trained_alike(dig_plan):
     lengths = {"--steps=2000", "--steps=4000"}
     trainings = [words for words in commands(dig_plan) if words[0] == "lerobot-train" and lengths & set(words)]
     shared = {tuple(word for word in words if not word.startswith((*own, "--steps="))) for words in trainings}
-    assert (len(trainings), len(shared)) == (24, 1)
+    assert (len(trainings), len(shared)) == (25, 1)
     longer = [Path(words[-1]).name for words in trainings if "--steps=4000" in words]
-    assert sorted(longer) == [f"changing_often_token-{seed}" for seed in (1000, 1001, 1002)]
+    often = [f"changing_often_token-{seed}" for seed in (1000, 1001, 1002)]
+    assert sorted(longer) == ["changing_late_token-1000", *often]
     recordings = [words for words in commands(dig_plan) if words[:2] == ["lerobot-excav", "demos"]]
     options = [dict(word.lstrip("-").split("=", 1) for word in words[2:]) for words in recordings]
     recorded = {Path(each["out"]).parent.name: 2 * int(each["scenes"]) * int(each["targets"]) for each in options}
     others = {name: number for name, number in recorded.items() if number != 240}
-    assert others == {"half": 120, "double": 480, "changing_often": 480}
+    assert others == {"half": 120, "double": 480, "changing_often": 480, "changing_late": 480}
     assert len({each["stages"] for each in options}) == 1
 
 
 def test_the_slim_copy_leaves_out_every_column_that_no_policy_reads(dig_plan):
     """A policy reads where commands change, if they do."""
     copies = [words for words in commands(dig_plan) if "--operation.type=remove_feature" in words]
-    assert len(copies) == 8
+    assert len(copies) == 9
     for words in copies:
         options = dict(word.lstrip("-").split("=", 1) for word in words[1:])
         read = {COMMAND_KEY} if options["repo_id"].startswith("local/excavator_changing") else set()
@@ -305,6 +306,9 @@ def test_the_page_of_the_excavator_has_a_row_for_all_metrics_that_have_landed():
     assert {name for row in rows for name in row["origins"]} == {path.stem for path in landed}
 
 
+TRAINED_LONGER = ("changing_often_token", "changing_late_token")
+
+
 def test_the_checkpoints_that_have_landed_were_trained_as_the_table_says():
     defaults = dict(re.findall(r'config\.get\("(steps|batch_size)", (\d+)\)', EXCAVATOR.read_text()))
     folders = list((ROOT / "results" / "excavator" / "checkpoints").iterdir())
@@ -312,10 +316,10 @@ def test_the_checkpoints_that_have_landed_were_trained_as_the_table_says():
     for folder in folders:
         training = json.loads((folder / "training.json").read_text())
         policy, _, seed = folder.name.rpartition("-")
-        longer = {"steps": str(2 * int(defaults["steps"]))} if policy == "changing_often_token" else {}
+        longer = {"steps": str(2 * int(defaults["steps"]))} if policy in TRAINED_LONGER else {}
         asked = {**defaults, **longer, "seed": seed}
         assert {name: str(training[name]) for name in asked} == asked
-        number = {"half_token": 120, "double_token": 480, "changing_often_token": 480}.get(policy, 240)
+        number = ({"half_token": 120} | dict.fromkeys(("double_token", *TRAINED_LONGER), 480)).get(policy, 240)
         assert training["demonstrations"] == number
         assert training["name"] == folder.name
         weighs = sum(path.stat().st_size for path in folder.iterdir())
